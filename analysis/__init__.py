@@ -45,10 +45,12 @@ _import, __dir__ = import_lazily(__name__, _MODULES)
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name when it is first used.
+    """Import an attribute of the package when it is first used, and return it.
 
-    Functions of :data:`_CHECKED` that are imported from here check their arguments. Functions of
-    the package call each other without these checks.
+    The functions named in :data:`_CHECKED` check the types and limits of their arguments if they
+    are imported from this package. Modules of the package import the same functions from the
+    modules in :data:`_MODULES`, and thus without these checks. Raises AttributeError for an unknown
+    name.
     """
     value = _import(name)
     if name in _CHECKED:

@@ -1,6 +1,6 @@
-"""Cite the software, the paper, and the works on which methods, solvers and analysis are based.
+"""Cite the software, the paper, and the works behind methods, solvers and analysis.
 
-The works are entries of ``references.bib``.
+The entries of the works are in ``references.bib``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ THEORIES = "harris1998", "todorov2002"
 
 @cache
 def references() -> Mapping[str, str]:
-    """Return the entries of ``references.bib`` by key, in BibTeX."""
+    """Return a dict that maps each citation key of ``references.bib`` to its BibTeX entry."""
     text = (resources.files("coartic.analysis") / "references.bib").read_text(encoding="utf-8")
     entries = re.finditer(r"^@\w+\{([^,]+),\n(?: .+\n)+\}", text, re.MULTILINE)
     return {entry[1]: entry[0] for entry in entries}
@@ -40,26 +40,33 @@ def bibliography(
     imports: Mapping[str, Sequence[str]] | None = None,
     worlds: Sequence[str] = ("",),
 ) -> str:
-    """Return BibTeX for the software, the paper and the methods; each work has one entry.
+    """Return BibTeX entries for the software, the paper, and the works behind the methods.
 
-    A comment before an entry says which methods, or what else, the work is cited for.
+    Each work has one entry, even if several methods cite it. A comment line before the entry names
+    the methods for which the work is cited, or another reason, such as ``the paper``.
 
     Parameters
     ----------
     methods : mapping of str to MethodInfo
-        Methods by id. A method from a file is cited as its author declares. If the author declares
-        nothing, there is only a comment.
+        Maps the id of each method to its declaration. A method from a file is cited as its author
+        declares. If the author declares no citation, a comment line says so.
     analysis : bool
-        True to add the works on which statistics and signatures are based.
+        True to add the works on which statistics and signatures are based, and the theories of
+        motor control that the pages compare with the methods.
     environment : mapping, optional
-        Environment of a results folder (:attr:`.Study.made_with`), whose version and commit are
-        cited; by default the version of this program is cited.
+        Environment of a results folder (:attr:`.Study.made_with`). Its version and commit of
+        coartic are cited. By default the version of this program is cited.
     imports : mapping, optional
-        Names and versions of the packages that a method's file imports, by the id of the method
-        (:attr:`.Study.imports`). They are named in a comment.
+        Maps the id of each method from a file to the names and versions of the packages that the
+        file imports (:attr:`.Study.imports`). They are named in a comment line.
     worlds : sequence of str
-        Worlds of the runs (:attr:`.Study.worlds`). They are named in the note on the software if
-        one is not the paper's.
+        Worlds of the runs (:attr:`.Study.worlds`); the empty string is the paper's world. The note
+        of the software's entry names all of them if at least one is not the paper's.
+
+    Returns
+    -------
+    str
+        The entries and comment lines, ready for a ``.bib`` file.
     """
     made_with = environment or {}
     note = f"Version {made_with.get('coartic') or __version__}"
@@ -111,11 +118,17 @@ def bibliography(
 
 
 def _misc(key: str, **fields: str) -> str:
-    """Return an entry ``@misc`` of BibTeX, with a line for each field."""
+    """Return a BibTeX entry of type ``@misc``.
+
+    Each keyword argument is a field of the entry and has a line of its own.
+    """
     lines = [f"  {name} = {{{value}}}," for name, value in fields.items()]
     return "\n".join([f"@misc{{{key},", *lines, "}"])
 
 
 def _comment(text: str) -> str:
-    """Return text as a comment line for BibTeX; (at) replaces @, which would begin an entry."""
+    """Return text as a comment line for a BibTeX file.
+
+    Each ``@`` is replaced by ``(at)``, because BibTeX would read it as the beginning of an entry.
+    """
     return f"% {one_line(text)}".replace("@", "(at)")

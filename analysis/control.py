@@ -5,15 +5,17 @@ method that selects its solution from trials are compared with those of random s
 (:mod:`coartic.baselines.random_search`), which is the paper's learner without its memory. The
 compared runs have
 
-- the same hand sequence. Signature ``hand``, the choice of hands itself, is compared with random
-  search that tries all hand sequences, and all its runs count;
-- the same treatment of the idle arm, if possible. A learner adds noise to the idle arm if its
-  condition has ``modify_other`` (EC2 and EC4). If there is no random search without this noise,
-  random search with it is used;
+- the same hand sequence. There is one exception: the signature ``hand`` measures the choice of
+  hands itself. It is compared with the form of random search that tries all hand sequences, and
+  all runs of this form count;
+- the same treatment of the idle arm, if possible. A learner adds exploration noise to the idle arm
+  if its condition has ``modify_other`` (EC2 and EC4). If the folder has no random search without
+  noise on the idle arm, random search with this noise is used instead;
 - the same number of trials;
-- a solution. A solved run that does not improve counts with its value, often 0.
+- a solution. A solved run that did not improve on the corrective process counts, too; its
+  signature is often 0.
 
-The test is the one-tailed exchange test of the difference of means over runs.
+The test is the one-tailed exchange test of the difference between the means over runs.
 """
 
 from __future__ import annotations
@@ -34,35 +36,45 @@ from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import HANDS, Array
 
 MIN_SHARE = 0.1
-"""Smallest share of a method's solved runs on a task that a compared hand sequence must have."""
+"""Smallest fraction of a method's solved runs on a task that must have a hand sequence, so that the
+runs with this hand sequence are compared with random search."""
 
 
 def with_control(
     study: Study, signature: str, task: str, label: str
 ) -> dict[str, tuple[Array, Array]]:
-    """Return a signature of the runs of a method and of random search, by hand sequence.
+    """Return a signature of a method and of random search, for each hand sequence.
 
     Parameters
     ----------
     study : Study
         Results with runs of the method and of random search.
     signature : str
-        Name in ``coartic.analysis.SIGNATURES``.
-    task, label : str
-        Task, and method with its setting, as in ``study.runs``.
+        Name of the signature: a key of ``coartic.analysis.SIGNATURES``.
+    task : str
+        Name of the task.
+    label : str
+        Label of the method: its id with its setting, as in column ``label`` of ``study.runs``.
 
     Returns
     -------
-    dict
-        For each hand sequence, the values of the method's runs and of the runs of random search
-        (:func:`control_of`) with these hands and the same number of trials, shape ``(n,)`` each.
+    dict of str to (ndarray, ndarray)
+        Maps each hand sequence, such as ``"RRLR"``, to two arrays of the signature, in its unit:
+        the values of the method's runs, shape ``(n,)``, and the values of the runs of random search
+        (:func:`control_of`), shape ``(m,)``. Both have these hands and the same number of trials.
 
         - A hand sequence is included if at least a tenth of the method's solved runs have these
           hands and the signature. The most frequent sequence comes first.
-        - Runs without the signature are left out.
-        - The second array is empty if there is no such random search.
-        - For signature ``hand`` there is at most one entry, ``""``, for all hands.
+        - Runs without the signature are left out of both arrays.
+        - The second array is empty if the folder has no such random search.
+        - Signature ``hand`` has at most one key, the empty string, for all hand sequences together.
         - Only the first 500 solved runs of each method count.
+
+    Raises
+    ------
+    CoarticError
+        The folder has no runs of the method on the task, or runs cannot be executed again
+        (:meth:`.Study.executed`).
 
     Examples
     --------
@@ -82,12 +94,13 @@ def with_control(
 
 @lru_cache(maxsize=4_096)
 def signature_by_hands(study: Study, signature: str, task: str, label: str) -> dict[str, Array]:
-    """Return a signature of a method's runs on a task, by hand sequence in alphabetical order.
+    """Return a dict that maps each hand sequence to the signature of its runs.
 
-    Arrays have shape ``(n,)``, with a number for each of the first 500 solved runs that has the
-    signature. Signature ``hand``, which measures the choice of hands itself, has one entry ``""``
-    for all hand sequences together, or none if no run has it. The result is cached: do not change
-    it.
+    The hand sequences are in alphabetical order. Each array has shape ``(n,)`` and is in the unit
+    of the signature. It has a value for each run that has these hands and the signature, and is one
+    of the first 500 solved runs of the method on the task. The signature ``hand`` measures the
+    choice of hands itself: its only key is the empty string, for the runs with all hand sequences
+    together. The dict is empty if no run has the signature. The result is cached: do not change it.
     """
     values = study.signature(signature, task, label).to_numpy(np.float64)
     hands = np.array(study.cells[task, label].hands.fillna("").tolist(), dtype=object)
@@ -101,11 +114,25 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
 def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool = False) -> str:
     """Return the label of the random search that controls a method on a task.
 
-    This random search has the hand sequence ``hands`` (if ``hands`` is empty, it tries all hand
-    sequences) and the same number of trials. The result is empty if there are no such runs.
+    This form of random search has the same number of trials as the method. Among these forms, the
+    one that treats the idle arm as the method does is preferred.
 
-    Random search that treats the idle arm as the method does is preferred. If there is none, random
-    search that explores both arms is used, unless ``alike`` is True.
+    Parameters
+    ----------
+    study : Study
+    task, label : str
+        Name of the task, and label of the method.
+    hands : str
+        Hand sequence that random search must have, such as ``"RRLR"``. The empty string stands for
+        the form of random search that tries all hand sequences.
+    alike : bool
+        True to accept only random search that treats the idle arm as the method does. If it is
+        False and there is no such random search, random search that explores both arms is accepted.
+
+    Returns
+    -------
+    str
+        The label; the empty string if the folder has no such runs.
     """
     controls, trials = _controls(study, task), _most_trials(study, task, label)
     explored = explores_idle_arm(study, task, label)
@@ -115,12 +142,12 @@ def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool =
 
 @lru_cache(maxsize=4_096)
 def explores_idle_arm(study: Study, task: str, label: str) -> bool:
-    """Return True if a method adds exploration noise to the idle arm.
+    """Return True if a method adds exploration noise to the idle arm on a task.
 
-    - On tasks for one arm, the result is always True.
-    - For the learner, its condition decides.
-    - For other methods, such as random search, their parameter ``idle_arm`` decides. If a method
-      does not have this parameter, the result is True.
+    - On a task for one arm, the result is always True.
+    - For the learner, the result is ``modify_other`` of its exploration condition.
+    - For any other method, such as random search, the result is the value of its parameter
+      ``idle_arm``, or True if the method does not have this parameter.
     """
     run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
@@ -134,11 +161,15 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
 
 @lru_cache(maxsize=4_096)
 def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
-    """Return the labels of the forms of random search on a task.
+    """Return a dict that maps forms of random search on a task to their labels.
 
-    A form is a method ``random-search...`` with its setting. The keys are the hand sequence (empty
-    if the form tries all hand sequences), the number of trials, and whether the idle arm is
-    explored. If several forms have the same key, the first is used. A form is left out if
+    A form is a method ``random-search...`` with its setting. Each key is a tuple of
+
+    - the hand sequence; the empty string if the form tries all hand sequences;
+    - the number of trials;
+    - True if the form explores the idle arm, otherwise False.
+
+    If several forms have the same key, the first of them is used. A form is left out if
 
     - it has more than one stage (parameter ``stages``);
     - it has no solved run on the task;
@@ -163,16 +194,39 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
 
 @lru_cache(maxsize=4_096)
 def _most_trials(study: Study, task: str, label: str) -> float:
-    """Return the largest number of trials of a method's runs on a task; 0 without trials."""
+    """Return the largest number of trials of a method's runs on a task.
+
+    The result is 0 for a method without trials.
+    """
     return float(study.cells[task, label].trials.fillna(0).max())
 
 
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
-    """Return by how much a method's signature exceeds that of random search on average.
+    """Return the mean difference between a method's signature and that of random search.
 
-    Each run is compared with the mean of random search with the same hands (for signature ``hand``,
-    with any hands). Only runs count for which :func:`with_control` has random search. The result is
-    in the unit of the signature, and NaN if no run counts.
+    From the signature of each run of the method, the mean signature of random search with the same
+    hand sequence is subtracted. (For signature ``hand``, random search tries all hand sequences.)
+    The result is the mean of these differences over runs.
+
+    Parameters
+    ----------
+    study : Study
+        Results with runs of the method and of random search.
+    signature : str
+        Name of the signature: a key of ``coartic.analysis.SIGNATURES``.
+    task, label : str
+        Name of the task, and label of the method.
+
+    Returns
+    -------
+    float
+        The mean difference, in the unit of the signature. Only runs count for which
+        :func:`with_control` has runs of random search. It is NaN if there are no such runs.
+
+    Raises
+    ------
+    CoarticError
+        The folder has no runs of the method on the task, or runs cannot be executed again.
     """
     pairs = with_control(study, signature, task, label).values()
     excess = [values - control.mean() for values, control in pairs if len(control)]
@@ -180,27 +234,41 @@ def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
 
 
 def selects(study: Study, label: str) -> bool:
-    """Return True if a method can select its solution from trials, and is not random search.
+    """Return True if a method selects its solution from trials, and is not random search.
 
-    A method can select if it declares that it uses the reward of each trial, and if one of its runs
-    made more than one trial.
+    A method can select its solution if it declares that it uses the reward of each trial, and if at
+    least one of its runs made more than one trial.
     """
     method = study.methods.loc[label]
     return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
 
 
 def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """Return the runs of random search that are the control of ``contexts``, or None.
+    """Return the runs of random search that control a comparison of two contexts, or None.
 
-    They are runs on the same two tasks, for the same goal, hand and part of the posture, with the
-    same number of trials as the method. On each task, they have the hand sequence that is most
-    frequent in the method's runs. Only the first 500 solved runs on each task count.
+    Parameters
+    ----------
+    study : Study
+        Results with runs of the method and of random search.
+    contexts : TwoContexts
+        Runs of a method of the study, at a goal that two tasks share.
 
-    The result is None if
+    Returns
+    -------
+    TwoContexts or None
+        Runs of random search on the same two tasks, at the same goal, with the same hand and the
+        same part of the posture. They have the same number of trials as the method. On each task,
+        random search has the hand sequence that is most frequent in the method's runs. Only the
+        first 500 solved runs on each task count. The result is None if
 
-    - the method is random search, or does not select its solution from trials (:func:`selects`);
-    - there is no such random search on both tasks;
-    - on one of the tasks, no run of random search hits the goal with the hand.
+        - the method is random search, or cannot select its solution from trials (:func:`selects`);
+        - one of the two tasks lacks such runs of random search;
+        - on one of the two tasks, no run of random search hits the goal with the hand.
+
+    Raises
+    ------
+    CoarticError
+        Runs of random search cannot be executed again (:meth:`.Study.executed`).
     """
     if not selects(study, contexts.method):
         return None
@@ -220,12 +288,25 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 
 
 def shared_goals(study: Study, label: str, *, part: Part = "all") -> Iterator[TwoContexts]:
-    """Yield a method's runs on two tasks, for each goal that the tasks share.
+    """Yield a comparison of a method's runs for each goal that two individual tasks share.
 
-    Two tasks share goals if they begin with the same goals (:func:`.context_pairs`). There is an
-    item for each pair of tasks, each shared goal, and each hand that hits this goal on both tasks.
-    Only the first 500 solved runs on each task count. ``part`` is the part of the posture that is
-    compared.
+    Two tasks share goals if they begin with the same goals (:func:`.context_pairs`). There is one
+    comparison for each pair of tasks, for each shared goal, and for each hand with which the method
+    hits this goal on both tasks. Only the first 500 solved runs on each task count.
+
+    Parameters
+    ----------
+    study : Study
+    label : str
+        Label of the method.
+    part : {"all", "base", "joints"}
+        Coordinates of the posture that are compared (:class:`.TwoContexts`).
+
+    Yields
+    ------
+    TwoContexts
+        The comparisons, in the order of the pairs of tasks, then of the goals, then left hand
+        before right hand.
     """
     for first, second, shared in context_pairs(study.individual_tasks):
         keys = (first, label), (second, label)
@@ -240,10 +321,11 @@ def shared_goals(study: Study, label: str, *, part: Part = "all") -> Iterator[Tw
 
 @lru_cache(maxsize=4)
 def shared_goal(study: Study, *, part: Part = "all") -> TwoContexts | None:
-    """Return the first item of :func:`shared_goals` of the first method that has one, or None.
+    """Return the first comparison of :func:`shared_goals` that a method of the study has, or None.
 
-    Methods are tried in this order: the paper's learner, methods from files, methods that represent
-    their algorithms, other methods.
+    The methods are tried in this order: the paper's learner, methods from files, methods that
+    represent their algorithms, and then all other methods. ``part`` names the coordinates of the
+    posture that are compared (:class:`.TwoContexts`). The result is cached.
     """
     rows = study.methods
     subjects = rows.index[rows.is_learner], rows.index[~rows.built_in]

@@ -1,7 +1,7 @@
-"""Compute gaps, shares of the possible gain, means and rankings from plain frames of results.
+"""Compute gaps, shares of the possible gain, means and rankings from a DataFrame of results.
 
-``load(folder).runs`` is such a frame; you can also make your own. It has a row for each run, with
-the columns
+``load(folder).runs`` is such a frame, and you can make your own. It has a row for each run, and the
+columns
 
 - ``method`` and ``task``;
 - ``reward``: negative ticks, NaN for a failed run;
@@ -10,9 +10,10 @@ the columns
 - ``corrective_best``, only for shares: the reward of the corrective process alone with its best
   hands, negative ticks.
 
-What is compared is the *value* of a run: its reward, or minus its ``mean_ticks`` in a world with
-noise (:func:`.run_values`). The costs of an ``Objective`` are the negatives of rewards. Frames with
-wrong values, and rankings of runs in different worlds, raise CoarticError.
+The functions compare the *value* of each run: its reward, or minus its ``mean_ticks`` in a world
+with motor noise (:func:`.run_values`). If you have the costs of an ``Objective``, use their
+negatives as rewards. The functions raise CoarticError for a frame with wrong values, and for a
+ranking of runs in different worlds.
 """
 
 from __future__ import annotations
@@ -37,14 +38,16 @@ SCORES = ("reward", "best_known")
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
 MIN_GAIN = 0.01
-"""Smallest possible gain of which there are shares in noise, as a share of the best known reward:
-smaller ones are about as large as the standard errors of the two means."""
+"""Smallest possible gain for which a share is computed in a world with noise, as a fraction of the
+best known reward. A smaller gain is about as large as the standard errors of the two mean rewards
+between which it lies."""
 DUPLICATE = (
     "a run must not occur twice (if runs of two sources have the same numbers, add a column seed, "
     "folder or run_id; number the draws of a bootstrap in a column run)"
 )
 _SOURCES = ("folder", "seed", "run_id", "run")
-"""Columns that tell runs of a method on a task apart, as far as a frame has them."""
+"""Columns that together identify a run among the runs of one method on one task. A frame can lack
+some or all of them."""
 
 
 def checked(
@@ -56,17 +59,20 @@ def checked(
 ) -> pd.DataFrame:
     """Check a user's frame, and return a copy of the columns that are needed.
 
-    If ``numbers`` has ``reward``, the result also has
+    If ``numbers`` contains ``reward``, the result has further columns:
 
-    - ``value`` (:func:`.run_values`), from ``reward`` and, if there is such a column,
-      ``mean_ticks``;
-    - ``is_noisy``: True where column ``motor_noise``, if there is one, is above 0;
-    - column ``status``, if there is one: a run must have a reward or mean ticks if its status is
-      ``ok`` (in noise both can be missing, :func:`.judge`), and neither otherwise.
+    - ``value``: the value of the run (:func:`.run_values`), from ``reward`` and, if the frame has
+      it, ``mean_ticks``;
+    - ``is_noisy``: True for a run whose ``motor_noise`` is above 0; False for all runs if the frame
+      does not have this column;
+    - ``status``, if the frame has it. It is checked against the value: a run with status ``ok``
+      must have a reward or mean ticks (in noise both can be missing, :func:`.judge`), and a run
+      with another status must have neither.
 
     Parameters
     ----------
     frame : DataFrame
+        The user's frame.
     numbers : sequence of str
         Columns of numbers. They are returned as float64, with NaN for missing numbers.
     names : sequence of str
@@ -82,19 +88,24 @@ def checked(
     Raises
     ------
     CoarticError
-        The object is not a DataFrame, it has no rows, a column is missing, or a value is wrong.
+        ``frame`` is not a DataFrame, it has no rows, a column is missing, a value of ``names`` is
+        missing, a value of ``numbers`` is not a finite number or NaN, or ``status`` contradicts the
+        value.
     """
     if not isinstance(frame, pd.DataFrame):
-        raise CoarticError(f"the frame must be a pandas.DataFrame, not a {type(frame).__name__}")
+        raise CoarticError(f"the frame is a {type(frame).__name__}; it must be a pandas.DataFrame")
     has_value, there = "reward" in numbers, {*frame.columns}
     status = ["status"] if has_value and "status" in there else []
     of_noise = [name for name in ("mean_ticks", "motor_noise") if has_value and name in there]
     numbers = [*numbers, *of_noise]
     wanted = [*dict.fromkeys((*names, *others, *status, *numbers))]
     if missing := [name for name in wanted if name not in {*frame.columns}]:
-        raise CoarticError(f"the frame has no column {', '.join(map(inline, missing))}")
+        raise CoarticError(
+            f"the frame has no column {', '.join(map(inline, missing))}; it needs "
+            f"{', '.join(map(inline, wanted))}"
+        )
     if not len(frame):
-        raise CoarticError("the frame has no rows")
+        raise CoarticError("the frame has no rows; it must have at least one")
     columns = frame[wanted].copy()
     columns.index = columns.index.set_names([None] * columns.index.nlevels)
     not_na = "it must be a name; read_csv reads some names as NA, unless keep_default_na=False"
@@ -105,7 +116,10 @@ def checked(
             of_name = columns[name].astype("Float64")
             values = of_name.to_numpy(np.float64, na_value=np.nan)
         except (TypeError, ValueError) as error:
-            raise CoarticError(f"column {inline(name)} must have numbers ({error})") from None
+            raise CoarticError(
+                f"column {inline(name)} has values that are not numbers ({error}); each value must "
+                "be a finite number or missing (NaN)"
+            ) from None
         refuse_rows(columns, name, np.isinf(values), "it must be a finite number")
         columns[name] = values
     if has_value:
@@ -120,14 +134,15 @@ def checked(
 
 
 def inline(name: object) -> str:
-    """Return the name of a column as one printable line, cut to 2,000 characters."""
+    """Return the name of a column as one printable line of at most 2,000 characters."""
     return plain(str(name))
 
 
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
-    """Return the names of columns in an argument as a list; a string is one name.
+    """Return an argument that names columns as a list of names.
 
-    ``what`` is the name of the argument, for the message of CoarticError.
+    A string counts as one name. Raises CoarticError if the argument is neither a string nor an
+    iterable of names. ``what`` is the name of the argument in the error message.
     """
     if isinstance(names, str):
         return [names]
@@ -137,9 +152,17 @@ def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
 
 
 def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
-    """Raise CoarticError if ``wrong`` is True in at least one row.
+    """Raise CoarticError if at least one row of a frame is wrong.
 
-    The message has the first wrong row's value in ``column``, and ``needed``: what would be right.
+    Parameters
+    ----------
+    frame : DataFrame
+    column : str
+        Column that has the wrong values. The message shows its value in the first wrong row.
+    wrong : array_like of bool, shape (rows,)
+        True for each wrong row.
+    needed : str
+        End of the message: what would be right.
     """
     if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
         (value,), (row,) = frame[column].iloc[rows[:1]].tolist(), frame.index[rows[:1]].tolist()
@@ -149,22 +172,28 @@ def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str)
 
 
 def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
-    """Return a copy of checked columns with ``gap``, and with ``share`` if they have :data:`ZERO`.
+    """Add columns ``gap`` and, if the columns have :data:`ZERO`, ``share`` to checked columns.
 
     gap = (best known - value) / |best known|
-    share = (value - zero) / (best known - zero), where zero is column :data:`ZERO`
+    share = (value - zero) / (best known - zero),
 
-    Both are NaN if the value or the best known reward is NaN. ``share`` is also NaN if zero is NaN,
-    or not below the best known reward; in noise also if zero is on average less than 1 % below it
-    (:data:`MIN_GAIN`), because the share would be chance.
+    where zero is the value in column :data:`ZERO`. Both are fractions. Both are NaN if the value or
+    the best known reward is NaN. The share is also NaN if
+
+    - zero is NaN, or is not below the best known reward;
+    - in a world with noise, zero is on average less than 1 % below the best known reward
+      (:data:`MIN_GAIN`), so that the share would be a matter of chance.
+
+    The result is a copy.
 
     Raises
     ------
     CoarticError
         - A value or a best known reward is above 0.
         - A best known reward is 0.
-        - A reward is above the best known reward by more than rounding (:data:`NEGLIGIBLE`), or
-          :data:`ZERO` is above the best known reward. In noise both can be by chance.
+        - Without noise, a reward is above the best known reward by more than rounding
+          (:data:`NEGLIGIBLE`), or :data:`ZERO` is above the best known reward. In a world with
+          noise, both can happen by chance and are allowed.
     """
     for name in ("reward", "value", "best_known"):
         sign = "a reward must be minus the ticks; for a cost, such as best_cost, use the negative"
@@ -186,7 +215,7 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
 
 
 def _refuse_worlds(frame: pd.DataFrame) -> None:
-    """Raise CoarticError if column ``world`` of a frame, if there is one, has several worlds."""
+    """Raise CoarticError if a frame has a column ``world`` with more than one world."""
     if "world" not in {*getattr(frame, "columns", ())}:
         return
     worlds = dict.fromkeys(frame.world.astype(object).where(frame.world.notna(), "").astype(str))
@@ -204,20 +233,23 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     Parameters
     ----------
     frame : DataFrame
+        The user's frame, with the columns of :func:`ranking`.
     *more : str
-        Further columns of numbers to return.
+        Names of further columns of numbers, which are checked and returned.
 
     Returns
     -------
     DataFrame
-        A copy of the columns that are needed, with
+        A copy of the columns that are needed, with these new or changed columns:
 
         - ``value``, ``gap``, and ``share`` if the frame has ``corrective_best``;
-        - ``method``, which includes the setting if the method has several settings in the frame;
-        - ``task``, the number of the task in the order of names, from 0;
-        - ``key``, a number for each run, the same in all rows of the run. Rows belong to the same
-          run if they agree in method, task and :data:`_SOURCES`. Without these columns, each row is
-          a run.
+        - ``method``: name of the method. It includes the setting if the frame has the method with
+          several settings;
+        - ``task``: number of the task, from 0, in the alphabetical order of the names of tasks;
+        - ``key``: number of the run. All rows of one run have the same number. Two rows belong to
+          the same run if they have the same method, the same task, and the same values in those
+          columns of :data:`_SOURCES` that the frame has. If it has none of them, each row is a run
+          of its own.
 
     Raises
     ------
@@ -250,9 +282,9 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 
 
 def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
-    """Return :func:`scored` for a frame in which each run must have one row.
+    """Return :func:`scored` of a frame, in which each run must have one row.
 
-    Raises CoarticError if the frame is wrong (:func:`scored`), or if a run has two rows.
+    Raises CoarticError if the frame is wrong (:func:`scored`), or if two rows belong to one run.
     """
     runs = scored(frame, *more)
     refuse_rows(runs, "method", runs.duplicated("key"), f"{DUPLICATE}; each run must have one row")
@@ -260,20 +292,22 @@ def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 
 
 def relative_gaps(frame: pd.DataFrame) -> pd.Series:
-    """Return the gap of each run to the best known reward of its task.
+    """Return the relative gap of each run to the best known reward of its task.
 
     Parameters
     ----------
     frame : DataFrame
-        With columns ``reward`` (NaN for a failed run) and ``best_known`` (NaN if the task has no
-        best known reward), negative ticks. Runs in noise have ``mean_ticks`` in place of a reward,
-        and ``motor_noise`` above 0; their gaps can be negative by chance.
+        A row for each run, with columns ``reward`` (NaN for a failed run) and ``best_known`` (NaN
+        if the task has no best known reward), both in negative ticks. A run in a world with motor
+        noise has NaN as its reward, its mean ticks in column ``mean_ticks``, and a ``motor_noise``
+        above 0. Its gap can be negative by chance.
 
     Returns
     -------
     Series
-        (best known - reward) / \\|best known\\| by the frame's index: 0.01 is 1 % more ticks than
-        the best known reward. It is NaN if one of the two rewards is NaN.
+        (best known - reward) / \\|best known\\| as a fraction, with the index of ``frame``: 0.01
+        stands for 1 % more ticks than the best known reward. The gap is NaN if one of the two
+        rewards is NaN.
 
     Raises
     ------
@@ -293,22 +327,27 @@ def relative_gaps(frame: pd.DataFrame) -> pd.Series:
 
 
 def shares(frame: pd.DataFrame) -> pd.Series:
-    """Return each run's share of the possible gain: 0 is the corrective process, 1 the best known.
+    """Return the share of the possible gain that each run reached.
+
+    The share is 0 for a run that is as good as the corrective process alone, and 1 for a run that
+    reaches the best known reward.
 
     Parameters
     ----------
     frame : DataFrame
-        With columns ``reward``, ``best_known`` and ``corrective_best``, in negative ticks.
-        ``corrective_best`` is the reward of the corrective process alone with its best hands. For a
-        task with more than 4,096 hand sequences, ``load(folder).runs`` has the reward with the
-        task's initial hands instead.
+        A row for each run, with columns ``reward``, ``best_known`` and ``corrective_best``, in
+        negative ticks. ``corrective_best`` is the reward of the corrective process alone with its
+        best hands. For a task with more than 4,096 hand sequences, ``load(folder).runs`` has the
+        reward with the task's initial hands instead. Runs in a world with motor noise are given as
+        in :func:`relative_gaps`.
 
     Returns
     -------
     Series
-        (reward - corrective_best) / (best_known - corrective_best) by the frame's index. It is
-        negative if the corrective process does better, and NaN if nothing can be gained (in noise
-        less than 1 % of the best known reward) or a reward is NaN.
+        (reward - corrective_best) / (best_known - corrective_best) as a fraction, with the index of
+        ``frame``. The share is negative if the corrective process alone is better than the run. It
+        is NaN if one of the three rewards is NaN, or if nothing can be gained: if the best known
+        reward is not above ``corrective_best``, or in noise by less than 1 % of itself.
 
     Raises
     ------
@@ -330,29 +369,34 @@ def shares(frame: pd.DataFrame) -> pd.Series:
 def means(
     frame: pd.DataFrame, by: str | Sequence[str], columns: str | Sequence[str]
 ) -> pd.DataFrame:
-    """Return the means of groups of rows, with their 95 % intervals.
+    """Return the mean of each group of rows, with its 95 % interval.
 
     Parameters
     ----------
     frame : DataFrame
-        A row for each task, or each run.
+        A row for each task or for each run. The rows of a group are a sample of independent values.
     by : str or sequence of str
-        Columns whose values define the groups. Rows with NaN form a group, too.
+        Names of the columns whose values define the groups. Rows with NaN in such a column form a
+        group of their own.
     columns : str or sequence of str
-        Columns of numbers. NaN is left out of means.
+        Names of the columns of numbers whose means are computed. NaN is left out of means.
 
     Returns
     -------
     DataFrame
-        A row for each group, in the order of first appearance: ``by``, the number of ``rows``, and
-        for each column ``x`` the mean ``x`` with its interval ``x_low`` to ``x_high`` (NaN with
-        fewer than five values); a mean without values is NaN.
+        A row for each group, in the order in which the groups first appear in ``frame``. It has
+
+        - the columns in ``by``;
+        - ``rows``: the number of rows of the group;
+        - for each column ``x`` in ``columns``: the mean ``x``, and the ends ``x_low`` and
+          ``x_high`` of its 95 % interval (:func:`coartic.analysis.mean`), in the unit of the
+          column. The mean is NaN without values, and the ends are NaN with fewer than five values.
 
     Raises
     ------
     CoarticError
-        The frame has no rows, a column is missing, a value of ``columns`` is not a finite number,
-        or ``by`` is empty.
+        The frame has no rows, a column is missing, a value of ``columns`` is neither a finite
+        number nor NaN, or ``by`` is empty.
 
     Examples
     --------
@@ -387,15 +431,25 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each pair of ``task`` and ``method`` (with the setting, as in :func:`ranking`), in
-        the order of first appearance. ``reward`` (negative ticks; in noise minus ``mean_ticks``),
-        ``gap`` and, if the frame has ``corrective_best``, ``share`` are means over the runs that
-        have such a number, NaN if no run has one. ``n`` is the number of solved runs.
+        A row for each pair of task and method, in the order in which the pairs first appear in
+        ``frame``:
+
+        - ``task``: name of the task;
+        - ``method``: name of the method, with its setting as in :func:`ranking`;
+        - ``reward``: mean reward, negative ticks (in a world with noise minus the mean of
+          ``mean_ticks``);
+        - ``n``: number of solved runs;
+        - ``gap``: mean gap, a fraction (:func:`relative_gaps`);
+        - ``share``: mean share of the possible gain, a fraction (:func:`shares`); only if the frame
+          has ``corrective_best``.
+
+        Each mean is over the runs that have the number, and NaN if no run has it.
 
     Raises
     ------
     CoarticError
-        The frame is wrong (:func:`ranking`).
+        A column or a name is missing, a reward is wrong (:func:`relative_gaps`), a task has more
+        than one best known reward, a run has two rows, or runs are in different worlds.
 
     Examples
     --------
@@ -422,42 +476,49 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         A row for each run, with columns ``method``, ``task`` (names, numbers or tuples), ``reward``
         and ``best_known`` (negative ticks). Optional columns:
 
-        - ``setting``: a method with several settings has a row for each setting,
-          ``"cma-es/bandit noise=0.1"``;
-        - ``ranked_as``: names of rows, used instead of ``method`` and ``setting``;
-        - ``corrective_best``: needed for shares (:func:`shares`);
+        - ``setting``: setting of the method. A method with several settings has a row of the
+          ranking for each setting, such as ``"cma-es/bandit noise=0.1"``;
+        - ``ranked_as``: name of the row of the ranking in which the run counts. It is used instead
+          of ``method`` and ``setting``;
+        - ``corrective_best``: reward of the corrective process alone with its best hands, which
+          shares need (:func:`shares`);
         - ``budget``: the number of trials that was asked for, missing for a method without trials;
         - ``noisy_ticks``: mean ticks of the run's solution with motor noise, missing if executions
           fail;
-        - ``note``: what readers should know of the run, empty or missing for nothing;
-        - ``mean_ticks`` and ``motor_noise``: in a world with noise (above 0) a run has mean ticks,
-          not a reward;
-        - ``world``: the world of the run, which all runs must share; empty for the paper's.
+        - ``note``: what readers should know about the run; empty or missing if there is nothing;
+        - ``mean_ticks`` and ``motor_noise``: a run with ``motor_noise`` above 0 has mean ticks
+          instead of a reward;
+        - ``world``: name of the run's world, empty for the paper's world. All runs must have the
+          same world.
 
-        ``load(folder).runs`` has all of them; ``load(folder).worlds`` has a study for each world.
+        ``load(folder).runs`` has all of these columns. If the folder has several worlds,
+        ``load(folder).worlds`` has a study for each of them.
 
     Returns
     -------
     DataFrame
-        A row for each method, by its name: first the ranked methods, the smallest gap first, then
-        the others.
+        A row for each method, indexed by the name of the method. Ranked methods come first, in
+        ascending order of their gaps; methods that are not ranked follow. All gaps and shares are
+        fractions.
 
-        - ``gap``: mean over tasks of the mean over runs. It is NaN for a method that is not ranked.
-          ``gap_low`` to ``gap_high`` is its 95 % interval for other runs on the same tasks (NaN
-          with fewer than five runs on a task).
-        - ``share``, ``share_low``, ``share_high``: share of the possible gain (:func:`shares`), a
-          mean over the tasks on which something can be gained. ``without_gain`` is the number of
-          other tasks. Only for a frame with ``corrective_best``.
-        - ``noisy_gap``, ``noisy_gap_low``, ``noisy_gap_high``: the gap of ``noisy_ticks`` to the
-          best known reward *without* noise, a mean like ``gap``; NaN if a run has no
+        - ``gap``: mean gap (:func:`relative_gaps`): the mean over tasks of the mean over the runs
+          on each task. It is NaN for a method that is not ranked. ``gap_low`` and ``gap_high`` are
+          the ends of its 95 % interval for other runs on the same tasks; they are NaN with fewer
+          than five runs on a task.
+        - ``share``, ``share_low``, ``share_high``: mean share of the possible gain
+          (:func:`shares`), over the tasks on which something can be gained. ``without_gain`` is the
+          number of the other tasks. Only for a frame with ``corrective_best``.
+        - ``noisy_gap``, ``noisy_gap_low``, ``noisy_gap_high``: mean gap of minus ``noisy_ticks`` to
+          the best known reward *without* noise, computed like ``gap``. It is NaN if a run has no
           ``noisy_ticks``. Only for a frame with ``noisy_ticks``.
-        - ``tasks``: number of tasks that the method solved in all runs.
-        - ``runs`` and ``failed``: numbers of runs and of failed runs.
-        - ``why``: why the method is not ranked, such as ``"1 of 2 tasks"`` or ``"6 of 9 runs
-          failed"``; empty for a ranked method.
-        - ``note``: the notes on the method's runs, each once. Only for a frame with ``note``.
+        - ``tasks``: number of tasks on which all runs of the method are solved.
+        - ``runs`` and ``failed``: number of runs, and number of failed runs.
+        - ``why``: the reason why the method is not ranked, such as ``"1 of 2 tasks"`` or ``"6 of 9
+          runs failed"``; empty for a ranked method.
+        - ``note``: the notes on the method's runs, joined by semicolons, each note once. Only for a
+          frame with ``note``.
 
-        Tasks without a best known reward are left out of gaps and shares.
+        Tasks without a best known reward do not count in gaps and shares.
 
     Raises
     ------

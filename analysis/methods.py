@@ -1,6 +1,7 @@
-"""Describe methods: facts about the built-in methods, and a frame of the methods of a study.
+"""Describe methods: their names, groups, colours and markers.
 
-Each method declares its facts itself. :func:`methods_of` returns the frame.
+The facts about a method, such as its title, are declared in the class of the method.
+:func:`methods_of` returns the frame.
 """
 
 from __future__ import annotations
@@ -21,15 +22,16 @@ if TYPE_CHECKING:
     from coartic.runs.method_info import MethodInfo
 
 CONDITION_OF = {f"{METHOD_PREFIX}{name}": name for name in EVERY_CONDITION}
-"""Ids of the learner's conditions, including informed ones and ablations, by id of the method."""
+"""Maps the id of each form of the learner to its exploration condition, such as ``EC4``. Informed
+conditions and ablations are included."""
 LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
-"""Ids of the learner under the paper's conditions: EC1 for one arm, and EC2, EC3 and EC4 for two
-arms."""
+"""Ids of the learner under the paper's exploration conditions: EC1 is for tasks with one arm, and
+EC2, EC3 and EC4 are for tasks with two arms."""
 INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
 """Ids of the informed learner, for one arm and for two arms."""
 RANKED_TOGETHER = {EC1: (EC4, EC3), INFORMED_LEARNERS[0]: INFORMED_LEARNERS[1:]}
-"""Ids of conditions for two arms by the id of the condition for one arm with which the first of
-them that ran has one row in the ranking."""
+"""Maps the id of the learner for one arm to the ids of learners for two arms. The learner for one
+arm shares a row of the ranking with the first of these learners that has runs."""
 RANDOM_SEARCH = "random-search"
 """Id of random search, which selects the best of random targets around corrective postures."""
 
@@ -46,12 +48,14 @@ COLORS = {
     "rose": "#dc9fc3",
     "amber": "#eba717",
 }
-"""Colours of methods by name, from dark to light. ``page.css`` has lighter ones for a dark page."""
+"""Maps the name of each colour of methods to its hexadecimal code, from dark to light. ``page.css``
+has lighter colours of the same names for a dark page."""
 OWN_COLOR, OWN_MARK = "walnut", "star"
 """Colour of the first nine methods from files, and marker of the first one. No built-in method has
 this colour or this marker."""
 ORDER = ("azure", "rust", "navy", "rose", "ink", "grape", "silver", "amber", "forest")
-"""Colours of the built-in methods of a group, in the order of these methods."""
+"""Names of the colours of built-in methods. The methods of a group take colours in this order,
+beginning at the first colour of the group (:data:`LOOKS_OF`)."""
 MARKS: dict[str, Any] = {
     "star": ("*", "-"),
     "diamond": ("D", (0, (9, 1.5))),
@@ -63,15 +67,17 @@ MARKS: dict[str, Any] = {
     "cross": ("X", (0, (7, 1, 3, 1))),
     "thin-diamond": ("d", "-"),
 }
-"""Markers of methods as Matplotlib names them, each with the dash of the method's lines."""
+"""Maps the name of each marker to Matplotlib's code of the marker, and to the line style (dashes)
+of the methods that have this marker."""
 
 
 KNOWN_METHODS: Mapping[str, type[Method]] = built_in_methods()
-"""Classes of the built-in methods by id, in the order of lists and figures."""
+"""Maps the id of each built-in method to its class, in the order of lists and figures."""
 SEARCHES = tuple(name for name in KNOWN_METHODS if name.startswith("optimum/"))
-"""Ids of the searches for the optimum, which are references and not compared with methods."""
+"""Ids of the searches for the optimum. Their results are references, with which methods are
+compared; the searches themselves are not ranked."""
 _WITHOUT_ARTICLE = ("CMA-ES", "random search", "hill climbing", "posture planning")
-"""Algorithms whose names have no article in a sentence."""
+"""Names of algorithms that have no article in a sentence."""
 _WORDS = {
     "other_arm": "other arm ",
     "noise_sd": "σ ",
@@ -82,7 +88,7 @@ _WORDS = {
     "spread": "spread ",
     "sequence": "hands ",
 }
-"""Words that stand before the values of parameters."""
+"""Maps names of parameters to the words that stand for them in titles, before the value."""
 
 
 def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False) -> str:
@@ -91,13 +97,23 @@ def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False
     Parameters
     ----------
     method : str or MethodInfo
-        Id or declaration. For a method from a file, the name is the title in its declaration; if
-        only the id is passed, the name is the id.
+        Id or declaration of the method. The name of a method from a file is the title in its
+        declaration, or the id if only the id is passed.
     setting : str
-        Setting of the method, such as ``sigma=0.1, stop=1``; it may be empty.
+        Setting of the method, such as ``sigma=0.1, stop=1``; empty for the default setting.
     short : bool
-        True for the short name, if the method has one. Otherwise the short name is the title of a
-        built-in method, and the id of a method from a file.
+        True for the short name that the method declares. If it declares none, the short name of a
+        built-in method is its title, and that of a method from a file is its id.
+
+    Returns
+    -------
+    str
+        The name, followed by the setting in parentheses if there is one.
+
+    Examples
+    --------
+    >>> title_of("cma-es/bandit", "sigma=0.1")
+    'CMA-ES (σ 0.1)'
     """
     if known := KNOWN_METHODS.get(method if isinstance(method, str) else method.name):
         name = (short and known.facts.short) or known.title
@@ -111,14 +127,16 @@ def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False
 def subject_of(method: Mapping[str, Any]) -> str:
     """Return the name of a method as the subject of a sentence.
 
-    A method from a file has a free title, which gets quotation marks. Other names get an article,
-    except names of activities, such as random search, and CMA-ES. A name that contains a comma,
-    such as ``CMA-ES, hands goal by goal``, ends in one.
+    - The title of a method from a file is put in quotation marks, because users choose it freely.
+    - The title of a built-in method gets the article *the*, except CMA-ES and names of activities,
+      such as random search.
+    - A title that contains a comma, such as ``CMA-ES, hands goal by goal``, gets a comma at its
+      end.
 
     Parameters
     ----------
     method : mapping
-        Row of :attr:`.Study.methods`: its ``title``, ``algorithm``, and whether it is ``built_in``.
+        A row of :attr:`.Study.methods`, with ``title``, ``algorithm`` and ``built_in``.
     """
     title = str(method["title"])
     if not method["built_in"]:
@@ -130,22 +148,25 @@ def subject_of(method: Mapping[str, Any]) -> str:
 
 
 def describe_setting(setting: str) -> str:
-    """Return a setting, such as ``sigma=0.1, stop=1``, as titles have it: ``σ 0.1, stop 1``."""
+    """Return a setting in the words of titles: ``σ 0.1, stop 1`` for ``sigma=0.1, stop=1``."""
     pairs = (part.partition("=") for part in one_line(setting).split(", "))
     words = (_WORDS.get(key, key + equals) + value for key, equals, value in pairs)
     return ", ".join(words).replace("_", " ")
 
 
 def describe_values(values: Mapping[str, Any]) -> str:
-    """Return values of varied parameters in words, such as ``noise_sd 0.05, epsilon 0.2``.
+    """Return the values of parameters in words, such as ``noise_sd 0.05, epsilon 0.2``.
 
-    Parameters have the names under which a suite sets them.
+    ``values`` maps the name of each parameter, as a suite's file writes it, to its value.
     """
     return ", ".join(f"{name} {one_line(str(value))}" for name, value in values.items())
 
 
 def default_name(method: str) -> str:
-    """Return what the default of a method's parameter (its id) is: *the paper's* or *default*."""
+    """Return what a method's default values are called: ``the paper's`` or ``default``.
+
+    They are ``the paper's`` for the learner under the paper's conditions. ``method`` is an id.
+    """
     return "the paper's" if method in LEARNERS else "default"
 
 
@@ -154,15 +175,15 @@ BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "using the reward as a formula",
     "not using the reward",
 )
-"""Groups of methods by their use of the reward."""
+"""Names of the three groups of methods, which differ in how they use the reward."""
 LOOKS_OF = {
     BY_TRIAL: ("azure", ("diamond", "circle", "triangle")),
     BY_FORMULA: ("amber", ("square", "inverted-triangle", "plus")),
     WITHOUT_REWARD: ("azure", ("cross", "thin-diamond")),
 }
-"""First colour and all markers of the built-in methods by group. The groups begin at different
-colours, so that the shortest-path plan differs from the learners and searches that figures compare
-with it."""
+"""Maps each group to the first colour and to all markers of its built-in methods. The groups that
+use the reward begin at different colours, so that the shortest-path plan looks different from the
+learners and searches with which figures compare it."""
 MARK = " ‡"
 """Mark after the title of a method for which there are warnings (:attr:`.Study.marks`)."""
 
@@ -170,25 +191,26 @@ MARK = " ‡"
 def methods_of(
     runs: pd.DataFrame, declared: Mapping[str, MethodInfo], marked: Collection[str] = ()
 ) -> pd.DataFrame:
-    """Return a frame of the methods that have runs, with a row for each setting.
+    """Return a frame with a row for each setting of each method with runs.
 
-    Built-in methods come first, in the order of :data:`.MODULES`, then methods from files, in the
-    order of the suite. If two conditions of the learner are ranked as one (:func:`ranked_as`), they
-    have a further row, with most columns of the second condition.
+    Built-in methods come first, in the order of :data:`.MODULES`. Methods from files follow, in the
+    order of the suite. If two conditions of the learner share a row of the ranking
+    (:func:`ranked_as`), they have a further row, which copies most columns of the second condition.
 
     Parameters
     ----------
     runs : DataFrame
         A row for each run, with the columns of :attr:`.Study.runs`, in the order of the suite.
     declared : mapping of str to MethodInfo
-        Declaration of each method, by its id without a setting.
+        Maps the id of each method, without a setting, to its declaration.
     marked : collection of str, optional
         Ids of methods whose titles get :data:`MARK`.
 
     Returns
     -------
     DataFrame
-        The index is the label of the method. The columns are those of :attr:`.Study.methods`.
+        The frame is indexed by the label of the method: its id with its setting. It has the columns
+        of :attr:`.Study.methods`.
     """
     import pandas as pd  # other parts of this module are used without pandas
 
@@ -240,23 +262,28 @@ def methods_of(
 
 
 def parameters_varied(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.DataFrame:
-    """Return the values of the parameters that a study varies.
+    """Return the values of the parameters that a study varies, for each setting.
 
-    A study varies parameters if, apart from searches for the optimum, all runs are of one method,
-    each of its settings was run on all tasks, and there are at least two settings.
+    A study varies parameters if, apart from searches for the optimum,
+
+    - all runs are of one method;
+    - the method has at least two settings;
+    - each setting was run on all tasks.
 
     Parameters
     ----------
-    runs, declared
-        As in :func:`methods_of`. Stored runs leave most parameters out that have their default,
-        which is then the declared one.
+    runs : DataFrame
+        A row for each run, as in :func:`methods_of`.
+    declared : mapping of str to MethodInfo
+        Maps the id of each method to its declaration. A parameter that a stored run leaves out has
+        the declared default.
 
     Returns
     -------
     DataFrame
-        A row for each label and a column for each parameter with at least two values. The parameter
-        with most values comes first. Rows are in ascending order of the columns that have only
-        numbers. The frame is empty if the study does not vary parameters.
+        A row for each label, and a column for each parameter that has at least two values. The
+        parameter with the most values comes first. The rows are sorted by the columns that have
+        only numbers, in ascending order. The frame is empty if the study does not vary parameters.
     """
     import pandas as pd
 
@@ -286,7 +313,7 @@ def are_numbers(values: Iterable[object]) -> bool:
 
 
 def _group_of(runs: pd.DataFrame) -> str:
-    """Return the group of a method, one of :data:`GROUPS`, from its runs.
+    """Return the group of a method (one of :data:`GROUPS`), which its declaration and runs decide.
 
     - ``using the reward of each trial``, if the method declares this and a run made more than one
       trial;
@@ -300,7 +327,10 @@ def _group_of(runs: pd.DataFrame) -> str:
 
 
 def _group_with(information: Collection[str]) -> str:
-    """Return the group of a method that uses kinds of information (values of Information)."""
+    """Return the group of a method that uses the given kinds of information.
+
+    ``information`` contains values of the enumeration :class:`.Information`.
+    """
     if Information.REWARD_BY_TRIAL.value in information:
         return BY_TRIAL
     return BY_FORMULA if Information.REWARD_FORMULA.value in information else WITHOUT_REWARD
@@ -309,9 +339,10 @@ def _group_with(information: Collection[str]) -> str:
 def ranked_as(runs: pd.DataFrame) -> pd.Series:
     """Return the name of the row of the ranking in which each run counts.
 
-    The name is the run's label (column ``label``), with one exception: if one condition of the
-    learner ran on tasks for one arm, and another condition on other tasks, for two arms, both have
-    the same name (:func:`joined_label`).
+    The name is the label of the run (column ``label``), with one exception. The learner needs one
+    condition for tasks with one arm and another condition for tasks with two arms. If both have
+    runs, and no task in common, they share a row (:data:`RANKED_TOGETHER`), and all their runs get
+    its name (:func:`joined_label`). The result has the index of ``runs``.
     """
     tasks = {label: {*of_method.task} for label, of_method in runs.groupby("label")}
     names = runs.label
@@ -324,14 +355,17 @@ def ranked_as(runs: pd.DataFrame) -> pd.Series:
 
 
 def joined_label(one: str, two: str) -> str:
-    """Return the label of the row of two learners (ids), such as ``dual-process (EC1, EC4)``."""
+    """Return the label of the row that two learners share, such as ``dual-process (EC1, EC4)``.
+
+    ``one`` and ``two`` are the ids of the learners for one arm and for two arms.
+    """
     return f"{METHOD_PREFIX.rstrip('/')} ({CONDITION_OF[one]}, {CONDITION_OF[two]})"
 
 
 def _pairs_of(group: str) -> list[tuple[str, str]]:
-    """Return the looks of a group: all pairs of a colour and one of the group's markers.
+    """Return all pairs of a colour and one of the markers of a group.
 
-    Pairs that follow each other differ in both.
+    Each pair differs from the previous pair in its colour and in its marker.
     """
     first, marks = LOOKS_OF[group]
     begin = ORDER.index(first)
@@ -343,10 +377,11 @@ def _pairs_of(group: str) -> list[tuple[str, str]]:
 
 
 def _looks_of_built_in() -> dict[str, tuple[str, str]]:
-    """Return the colour and the marker of each built-in method that represents its algorithm.
+    """Return a dict that maps ids of built-in methods to colours and markers.
 
-    In each group (:data:`GROUPS`) the methods get the pairs of :func:`_pairs_of` in their order. A
-    condition for one arm has the colour of the condition for two arms with which it is ranked.
+    It has the methods that represent their algorithms. The methods of each group (:data:`GROUPS`)
+    take the pairs of :func:`_pairs_of`, in the order of the methods. The learner for one arm gets
+    the colour of the first learner for two arms in :data:`RANKED_TOGETHER`.
     """
     looks, free = dict[str, tuple[str, str]](), {group: _pairs_of(group) for group in GROUPS}
     headlines = {name: each for name, each in KNOWN_METHODS.items() if each.facts.headline}
@@ -359,16 +394,19 @@ def _looks_of_built_in() -> dict[str, tuple[str, str]]:
 
 
 LOOKS = _looks_of_built_in()
-"""Names of colour and marker of the built-in methods that represent their algorithms, by id."""
+"""Maps the id of each built-in method that represents its algorithm to the names of its colour and
+its marker."""
 
 
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield the label of each row with the names of its colour and marker.
+    """Yield, for each row, its label and the names of its colour and marker.
 
-    - A row with a ``style`` keeps it.
-    - The first nine methods from files have :data:`OWN_COLOR` and a marker.
-    - Other rows have the next free pair of their group, those with unused colours first. After the
-      last pair, the first is used again.
+    - A row that has a ``style`` already keeps it.
+    - The first nine methods from files get the colour :data:`OWN_COLOR`, each with another marker.
+    - Each other row gets the next free pair of its group. Pairs whose colour no ``style`` has come
+      first. After the last free pair, the first one is used again.
+
+    ``rows`` maps labels to the columns of :attr:`.Study.methods`.
     """
     fixed = {row["style"] for row in rows.values()}
     taken = {look[0] for look in fixed if look}
@@ -389,19 +427,20 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return rows without the settings and ablations of methods that are also in ``rows``.
+    """Return rows of methods without settings and ablations of other methods in these rows.
 
-    ``rows`` are rows of :attr:`.Study.methods`; their column ``parent`` is used. Values of a varied
-    parameter are not left out.
+    ``rows`` are rows of :attr:`.Study.methods`. Column ``parent`` names the method of which a row
+    is a setting or an ablation. The settings of a study that varies parameters are kept.
     """
     return rows[~rows.parent.isin(rows.index)]
 
 
 def headline_methods(rows: pd.DataFrame) -> list[str]:
-    """Return the labels of the rows that represent their algorithms, or all labels if none does.
+    """Return the labels of the methods that represent their algorithms.
 
-    ``rows`` are rows of :attr:`.Study.methods`; their column ``headline`` is used. Settings and
-    ablations are left out as in :func:`without_settings`.
+    If no method in ``rows`` does, all labels are returned. ``rows`` are rows of
+    :attr:`.Study.methods`; column ``headline`` says which methods represent their algorithms.
+    Settings and ablations are left out as in :func:`without_settings`.
     """
     headlines = without_settings(rows)
     headlines = headlines[headlines.headline]

@@ -1,4 +1,7 @@
-"""Find the best known rewards of tasks, from which gaps are measured, and proven bounds."""
+"""Find the best known reward of each task and its proven bound.
+
+Gaps are measured from the best known rewards.
+"""
 
 from __future__ import annotations
 
@@ -32,31 +35,32 @@ class BestKnown(KnownOptimum):
     run_id: str = ""
     """Id of the best run; empty if the source is not a run."""
     only_here: bool = False
-    """True if no reward is shipped, and no search for the optimum (with the task's own base) has a
-    solution."""
+    """True if only methods of this folder know a reward: no reward is shipped for the task, and no
+    search for the optimum of this folder solved it with the task's own base."""
 
 
 CANDIDATES = 5
-"""How many runs on a task are executed afresh, to find the best of them in a world with noise."""
+"""Number of runs on a task that are executed again in a world with noise, to find the best of them:
+those with the best stored values."""
 FRESH_EXECUTIONS = 1_000
-"""Number of executions by which a reference is judged in a world with noise."""
+"""Number of executions with motor noise whose mean ticks are a reference in a world with noise."""
 
 
 def run_values(runs: pd.DataFrame) -> pd.Series:
-    """Return the value of each run, which all rankings compare.
+    """Return the value of each run, the number that all rankings compare.
 
-    The value is the reward of a run in a world without noise, and minus its ``mean_ticks`` in a
-    world with noise, where rewards are missing. It is NaN for a failed run.
+    The value of a run is its reward. In a world with noise, where the reward is missing, the value
+    is minus the run's ``mean_ticks``. It is NaN for a failed run.
 
     Parameters
     ----------
     runs : DataFrame
-        With ``reward`` (negative ticks) and optionally ``mean_ticks``.
+        A row for each run, with column ``reward`` (negative ticks) and optionally ``mean_ticks``.
 
     Returns
     -------
     Series
-        Values (negative ticks, float64) by the index of ``runs``.
+        Values in negative ticks, as float64, with the index of ``runs``.
     """
     names = [name for name in ("reward", "mean_ticks") if name in runs]
     numbers = runs[names].astype("Float64").to_numpy(np.float64, na_value=np.nan)
@@ -72,18 +76,21 @@ def best_known(
     models: Mapping[str, MotionModel] | None = None,
     fresh: Callable[[str, Sequence[str]], Sequence[float]] | None = None,
 ) -> dict[str, BestKnown]:
-    """Return the best known reward of each task in one world, from shipped rewards and runs.
+    """Return the best known reward of each task in one world.
 
-    All solved runs count, including searches and runs copied from other folders. Runs with another
-    base do not count, because they solve another task. A task is left out if
+    The best known reward is the highest among the shipped reward and the rewards of all solved
+    runs, including those of searches for the optimum and runs that were included from other
+    folders. Runs of searches with another base than the task's do not count, because they solve
+    another task. A task is left out if
 
-    - its best reward is 0, because a gap could not be computed;
+    - its best reward is 0, because the gap is divided by this reward;
     - no reward is known;
-    - only runs of one method with one setting are known, and this method is not a search. These
-      runs would be compared with themselves.
+    - no reward is shipped, and all runs are of one method with one setting, which is not a search
+      for the optimum. These runs would be compared with themselves.
 
-    In a world with noise the best of many stored values would partly be luck. There the five runs
-    with the best values are executed afresh, and the best of these means is the reward.
+    In a world with noise, the best of many stored values would be best partly by luck. Therefore
+    the five runs with the best values are executed again with other noise, and the highest of these
+    means counts instead.
 
     Parameters
     ----------
@@ -91,16 +98,18 @@ def best_known(
         Stored runs of one world, with ``task``, ``method``, ``setting``, ``run_id``, ``status``,
         ``parameters``, ``reward`` and ``mean_ticks`` (:func:`run_values`), ``hands``.
     tasks : iterable of Task
-    models : mapping of MotionModel, optional
-        The world by the name of the task; the paper's if it is missing.
+        The tasks of the study.
+    models : mapping of str to MotionModel, optional
+        Maps the name of each task to the motion model of the world. A task without an entry has the
+        paper's model.
     fresh : callable, only in a world with noise
-        Function of a task's name and ids of runs on it. It returns minus the mean ticks of
-        :data:`FRESH_EXECUTIONS` executions of each run.
+        Function of the name of a task and of the ids of runs on this task. It executes each run
+        :data:`FRESH_EXECUTIONS` times and returns minus the mean ticks of each run.
 
     Returns
     -------
-    dict
-        Best known rewards by the name of the task.
+    dict of str to BestKnown
+        Maps the name of each task to its best known reward.
     """
     values = run_values(runs)
     solved = runs.assign(value=values)[
@@ -134,10 +143,19 @@ def best_known(
 
 
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the parameters with which searches for the optimum restrict movements, for each run.
+    """Return how each run's search for the optimum restricted base and other arm.
 
-    The columns are ``base`` and ``other_arm``; the index is that of ``runs``. For methods that are
-    not searches, the values are ``task`` and ``free``, even if they have parameters of these names.
+    Parameters
+    ----------
+    runs : DataFrame
+        Stored runs, with columns ``method`` and ``parameters`` (JSON).
+
+    Returns
+    -------
+    DataFrame
+        The values of the parameters ``base`` and ``other_arm`` of each run, with the index of
+        ``runs``. For a method that is not a search for the optimum, they are ``task`` and ``free``,
+        even if the method has parameters of these names.
     """
     default = {"base": BASE, "other_arm": "free"}
     pairs = [*zip(runs.method, runs.parameters, strict=True)]
@@ -151,5 +169,9 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def relative_gap(rewards: ArrayLike, optimum: ArrayLike) -> Array:
-    """Return (optimum − reward) / |optimum|, which is 0.01 for 1 % more ticks."""
+    """Return (optimum − reward) / |optimum|, a fraction: 0.01 is 1 % more ticks.
+
+    ``rewards`` and ``optimum`` are in negative ticks. The result has the shape to which both
+    broadcast.
+    """
     return np.asarray(np.subtract(optimum, rewards, dtype=np.float64) / np.abs(optimum))

@@ -1,7 +1,9 @@
 """Read recorded trials of people, and check whether they fit the task.
 
-A recording is a table with a row for each hit. A table that cannot be read raises CoarticError,
-with its first wrong row. :func:`consistency` gives two numbers for each hit of any other table.
+A recording is a table with a row for each hit of a goal. For a table with a missing column or a
+wrong value, the functions raise CoarticError, whose message shows the first wrong row. For any
+other table, :func:`consistency` returns two numbers for each hit: how far the hand is from the
+goal, and how fast the movement is.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from coartic.model import PAPER
 from coartic.robot import MAX_ENTRY, Array
 
 FAR = 2.0
-"""Distance from the centre of a goal (in radii) beyond which a hit does not fit the task."""
+"""Largest distance of the hand from the centre of the goal, in radii of the goal, at which a
+recorded hit fits the task."""
 _KEY = ["subject", "trial", "goal"]
 _OF_CALLER = 6  # level in the stack of the caller of a function with checked arguments
 
@@ -38,7 +41,8 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
     task : Task
         The task that was practised.
     ticks_per_unit : float
-        Number of ticks in one unit of ``duration``, such as 100 for seconds.
+        Number of ticks in one unit of column ``duration``. For durations in seconds, 100 says that
+        a tick is 10 ms.
 
     Returns
     -------
@@ -48,9 +52,17 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
     Raises
     ------
     CoarticError
-        The file cannot be read, or :func:`check_hits` refuses its rows.
+        - The file cannot be read.
+        - The file has a column ``ticks``, and also a column ``duration`` or a ``ticks_per_unit``
+          other than 1.
+        - :func:`check_hits` refuses the rows.
     ValueError
-        ``ticks_per_unit`` is not above 0.
+        ``ticks_per_unit`` is not from 1e-9 to 1e9.
+
+    Warns
+    -----
+    UserWarning
+        Hits do not fit the task (:func:`check_hits`).
     """
     return _judged(_hits_in_file(path, task, ticks_per_unit), task, str(path))
 
@@ -59,53 +71,55 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
 def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
     """Return recorded hits, checked and sorted by subject, trial and goal.
 
-    In each trial, angles are unwrapped from the start of the task to the first hit, and from hit to
-    hit.
+    The joint angles of each trial are unwrapped: a multiple of 2π is added to each angle, so that
+    it differs by at most π from the angle at the previous hit, or at the start of the task.
 
     Parameters
     ----------
     frame : DataFrame
         A row for each hit, with the columns
 
-        - ``subject``; ``trial`` and ``goal``, both from 1; ``hand`` (left or right)
-        - ``ticks``: the time since the previous hit of the trial, or since its start
-        - the posture at the hit (in length units and rad): a column for each name in
-          ``task.robot.joint_names``
+        - ``subject``: name of the person;
+        - ``trial``: number of the person's trial, from 1;
+        - ``goal``: number of the goal that is hit, from 1;
+        - ``hand``: the hand that hits the goal, ``left`` or ``right``;
+        - ``ticks``: the time since the previous hit of the trial, or since its start;
+        - the posture at the hit: a column for each name in ``task.robot.joint_names``, with the
+          position of the base in length units and the joint angles in rad.
 
-        Hits may be missing. The columns of a locked base, and of an arm that is not among
-        ``task.hands``, may also be missing: their values are then those at the start of the task.
+        Rows of some hits may be missing. A column of the base may be missing if the task locks the
+        base in this coordinate, and the columns of an arm may be missing if its hand is not among
+        ``task.hands``. Missing columns have the values at the start of the task.
     task : Task
         The task that was practised.
 
     Returns
     -------
     DataFrame
-        The columns above, and no others, with numbers as float64 and a new index. Subjects keep
-        their order.
+        The columns above, and no others, with numbers as float64 and a new index. Subjects are in
+        the order in which they first appear in ``frame``.
 
     Raises
     ------
     CoarticError
-        One of these is the case:
-
-        - a column is missing, or a value does not fit its column;
-        - a hit occurs twice;
-        - more than half of a subject's hits are more than two radii from the centres of their
+        - A column is missing, or a value does not fit its column.
+        - Two rows have the same subject, trial and goal.
+        - More than half of the hits of a subject are more than two radii from the centres of their
           goals.
 
     Warns
     -----
     UserWarning
-        Some hits of a subject are more than two radii from the centres of their goals, or the
-        median movement of a subject takes less than a tenth or more than ten times the model's
-        time.
+        - At least one hit of a subject is more than two radii from the centre of its goal.
+        - The median movement of a subject takes less than a tenth, or more than ten times, of the
+          time of a straight movement of the model.
     """
     return _judged(_readable(frame, task, "the frame"), task, "the frame")
 
 
 @checked_arguments
 def consistency(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
-    """Return how well each recorded hit fits the task.
+    """Return how well each recorded hit fits the task, in position and in time.
 
     Parameters
     ----------
@@ -117,13 +131,14 @@ def consistency(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each hit with ``subject``, ``trial``, ``goal``, ``hand`` and
+        A row for each hit, with columns ``subject``, ``trial``, ``goal``, ``hand`` and
 
-        - ``x``, ``y``: the position of the hand (in length units), by forward kinematics from the
-          posture
-        - ``off``: the distance of the hand from the centre of the goal, in radii of the goal
-        - ``pace``: the ticks of the movement divided by those of a straight movement of the model
-          from the previous hit, or from the start; NaN if the previous hit is missing
+        - ``x``, ``y``: the position of the hand in length units, computed from the posture by
+          forward kinematics;
+        - ``off``: the distance of the hand from the centre of the goal, in radii of the goal;
+        - ``pace``: the recorded ticks of the movement, divided by the ticks of a straight movement
+          of the model between the same two postures (the previous hit, or the start of the task,
+          and this hit). It is NaN if the row of the previous hit is missing.
 
     Raises
     ------
@@ -137,8 +152,8 @@ def consistency(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
     >>> hits = read_hits("docs/examples/recordings/metres.csv", task, ticks_per_unit=100)
     >>> consistency(hits, task).round(2).head(2)
       subject  trial  goal   hand     x     y   off  pace
-    0      p1    1.0   1.0  right  0.06  0.45  0.98  1.01
-    1      p1    1.0   2.0  right  0.24  0.40  1.00  1.00
+    0      p1    1.0   1.0  right  0.05  0.46  0.98  2.66
+    1      p1    1.0   2.0  right  0.25  0.41  0.80  2.02
     """
     return _fit(_readable(hits, task, "the frame"), task)
 
@@ -147,25 +162,32 @@ def consistency(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
 def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     """Return recorded trials as solutions, so that their signatures can be computed.
 
-    Nothing is executed: postures and (rounded) ticks are those of the recording.
+    No movement is simulated: the postures are those of the recording, and the ticks are rounded to
+    integers.
 
     Parameters
     ----------
     task : Task
-        The task of the trials.
+        The task that was practised.
     hits : DataFrame
         Recorded hits, as :func:`check_hits` describes them.
 
     Returns
     -------
     Solutions
-        A run for each trial in which all goals are hit; ``run_ids`` are subject and trial, such as
-        ``P1 3``.
+        A run for each trial in which all goals are hit. The id of a run is the name of the subject
+        and the number of the trial, such as ``P1 3``. ``unfinished`` is the number of the other
+        trials.
 
     Raises
     ------
     CoarticError
         The hits are refused (:func:`check_hits`), or no trial hits all goals.
+
+    Warns
+    -----
+    UserWarning
+        Hits do not fit the task (:func:`check_hits`).
     """
     checked = _judged(_readable(hits, task, "the frame"), task, "the frame")
     runs, unfinished = {}, 0
@@ -183,7 +205,10 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
             )
             runs[f"{subject} {trial:g}"] = Execution(movements, postures, sum(ticks), 0)
     if not runs:
-        raise CoarticError("no trial hits all goals: signatures need at least one")
+        raise CoarticError(
+            f"the frame has no trial with hits of all {len(task.goals)} goals; signatures need at "
+            "least one"
+        )
     return Solutions(task, "recorded", tuple(runs.values()), tuple(runs), unfinished)
 
 
@@ -191,7 +216,11 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
 
 
 def _hits_in_file(path: str | Path, task: Task, ticks_per_unit: float) -> pd.DataFrame:
-    """Return the hits of a CSV file as :func:`_readable` does, with ``duration`` as ``ticks``."""
+    """Return the hits of a CSV file as :func:`_readable` does.
+
+    Column ``duration``, if there is one, is converted to ``ticks``. Raises the errors of
+    :func:`read_hits`.
+    """
     check_limits("ticks_per_unit", ticks_per_unit, 1e-9, 1e9)
     frame, source = _table(path), str(path)
     if "ticks" in frame and ("duration" in frame or ticks_per_unit != 1):
@@ -206,9 +235,9 @@ def _hits_in_file(path: str | Path, task: Task, ticks_per_unit: float) -> pd.Dat
 
 
 def _table(path: str | Path) -> pd.DataFrame:
-    """Return a CSV file as a frame whose index counts rows from 1.
+    """Return a CSV file as a frame, indexed by data rows from 1.
 
-    Raises CoarticError if the file cannot be read.
+    Raises CoarticError if the file cannot be read, or is not a table.
     """
     try:
         with warnings.catch_warnings():
@@ -228,7 +257,10 @@ def _table(path: str | Path) -> pd.DataFrame:
 
 
 def _require(frame: pd.DataFrame, columns: list[str], source: str) -> None:
-    """Raise CoarticError if a column is missing or duplicate, or if there are no rows."""
+    """Raise CoarticError if a column is missing or duplicate, or rows are missing.
+
+    ``source`` is the name of the frame in the message.
+    """
     if missing := [name for name in columns if name not in frame]:
         found = ", ".join(map(str, frame.columns)) or "none"
         raise CoarticError(
@@ -242,9 +274,10 @@ def _require(frame: pd.DataFrame, columns: list[str], source: str) -> None:
 
 
 def _numbers(frame: pd.DataFrame, columns: list[str], source: str) -> Array:
-    """Return columns as numbers, shape ``(rows, columns)``.
+    """Return columns of a frame as an array of float64, shape ``(rows, columns)``.
 
-    Raises CoarticError for values that are not real numbers from -1e5 to 1e5.
+    Raises CoarticError for a value that is not a real number from -1e5 to 1e5. ``source`` is the
+    name of the frame in the message.
     """
     numbers = np.empty((len(frame), len(columns)))
     for k, name in enumerate(columns):
@@ -262,10 +295,20 @@ def _numbers(frame: pd.DataFrame, columns: list[str], source: str) -> Array:
 
 
 def _refuse(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str, source: str) -> None:
-    """Raise CoarticError if rows are ``wrong``.
+    """Raise CoarticError if at least one row of a frame is wrong.
 
-    The message has the first wrong row, the number of wrong rows, and ``needed``: what would be
-    right. ``source`` is the name of the frame in the message.
+    Parameters
+    ----------
+    frame : DataFrame
+    column : str
+        Column that has the wrong values. The message shows its value in the first wrong row, and
+        the number of wrong rows.
+    wrong : array_like of bool, shape (rows,)
+        True for each wrong row.
+    needed : str
+        What would be right, for the end of the message.
+    source : str
+        Name of the frame in the message.
     """
     if rows := np.flatnonzero(np.asarray(wrong, dtype=bool)).tolist():
         (value,) = frame[column].iloc[rows[:1]].tolist()
@@ -278,7 +321,11 @@ def _refuse(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str, sou
 
 
 def _readable(frame: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
-    """Return recorded hits as :func:`check_hits` does, without checking whether postures fit."""
+    """Return recorded hits as :func:`check_hits` does, without a check of postures and times.
+
+    Raises CoarticError if a column is missing, a value does not fit its column, or a hit occurs
+    twice. ``source`` is the name of the frame in the message.
+    """
     joints = [*task.robot.joint_names]
     is_used = np.zeros(len(joints), dtype=bool)
     for hand in task.hands:
@@ -313,7 +360,7 @@ def _readable(frame: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
 
 
 def _fit(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
-    """Return :func:`consistency` for hits that :func:`_readable` returns."""
+    """Return the frame of :func:`consistency` for hits that :func:`_readable` returned."""
     joints = [*task.robot.joint_names]
     q, goal = hits[joints].to_numpy(), hits.goal.to_numpy(np.int64)
     hand_positions = np.empty((len(q), 2))
@@ -331,7 +378,7 @@ def _fit(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
 
 
 def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
-    """Return hits of :func:`_readable` unchanged, after checking whether they fit the task.
+    """Check whether hits that :func:`_readable` returned fit the task, and return them unchanged.
 
     - Warns if hits of a subject are more than two radii from the centres of their goals. Raises
       CoarticError if more than half of the subject's hits are.
@@ -340,7 +387,8 @@ def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
     """
     for subject, fit in _fit(hits, task).groupby("subject", sort=False):
         far, pace = fit.off > FAR, fit.pace.median()
-        words = f"{source}: {far.sum()} of {len(far)} hits of {subject} are more than 2 radii off"
+        words = f"{source}: {far.sum()} of {len(far)} hits of {subject} are more than 2 radii from "
+        words += "the centres of their goals"
         if far.mean() > 0.5:
             raise CoarticError(
                 f"{words}. Joint angles must be in rad, anticlockwise, from the direction of the "

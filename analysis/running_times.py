@@ -1,8 +1,9 @@
-"""Compute running times: the costs at which runs reach reward targets.
+"""Compute running times: the costs, such as trials, at which runs reach reward targets.
 
-Running times are defined as in COCO (Hansen et al. 2021). Their empirical distribution (ECDF) is
-the share of pairs of run and target that are reached within a budget. :func:`runtimes` returns it
-for a results folder, :func:`ecdf` for a plain frame.
+Running times and their ECDF are defined as in COCO (Hansen et al. 2021). The empirical cumulative
+distribution function (ECDF) of running times maps a budget to the fraction of all pairs of a run
+and a target in which the run reached the target within the budget. :func:`runtimes` returns the
+ECDF for a results folder, and :func:`ecdf` for a frame of your own.
 """
 
 from __future__ import annotations
@@ -28,23 +29,35 @@ from coartic.robot import Array
 from coartic.runs.plan import world_title
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
-"""Costs, as columns of :attr:`.Study.runs`; ``solve_s`` is wall time, in s."""
+"""The three costs, named as columns of :attr:`.Study.runs`: numbers of trials, numbers of
+forward-kinematics evaluations, and the wall time of solving, in s."""
 TARGETS = tuple(n / 20 for n in range(1, 21))
-"""Targets, as shares of the distance between two rewards: that of the corrective process alone with
-its best hands, and the best known reward."""
+"""Reward targets. Each is a fraction of the distance between two rewards: 0 is the reward of the
+corrective process alone with its best hands, and 1 is the best known reward."""
 
 _MAX_DRAWN_RUNS = 20_000_000  # in all resamples together; very many runs have fewer resamples
 RunningTimes = Sequence[Array]
-"""For each task, the cost at which each run of a method reaches each target, shape
-``(runs, targets)``; infinite if the run does not reach the target."""
+"""A list with an array for each task, shape ``(runs, targets)``: the cost at which each run of a
+method reaches each target. The cost is infinite if the run does not reach the target."""
 
 
 def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Return the finite running times, their weights, and the numbers of their runs.
+    """Return the reached pairs of run and target, in ascending order of running time.
 
-    Each array has shape ``(k,)``. Running times are in ascending order. Runs are numbered from 0
-    through all tasks. All tasks have the same weight. The weights of all pairs of run and target,
-    including pairs that are not reached, sum to 1. Each task must have a run.
+    Parameters
+    ----------
+    times : sequence of arrays, shape (runs, targets)
+        Running times on each task. Each task must have a run.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        Running times of the k pairs that are reached, in ascending order.
+    ndarray, shape (k,)
+        Weights of these pairs. All tasks have the same weight, and so have all pairs of a task. The
+        weights of all pairs, including those that are not reached, sum to 1.
+    ndarray of int, shape (k,)
+        Numbers of the runs of these pairs. Runs are numbered from 0, continuously over all tasks.
     """
     values = np.concatenate([of_task.ravel() for of_task in times])
     order = np.argsort(values, kind="stable")
@@ -55,9 +68,20 @@ def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
 
 
 def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
-    """Return the budgets at which the share of reached targets rises, and these shares.
+    """Return the ECDF of running times: the budgets at its steps, and its values there.
 
-    Both have shape ``(k,)``. If no target is reached, there is one infinite budget with share 0.
+    Parameters
+    ----------
+    times : sequence of arrays, shape (runs, targets)
+        Running times on each task. All tasks have the same weight.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        Budgets at which the ECDF rises, in ascending order, in the unit of ``times``.
+    ndarray, shape (k,)
+        Values of the ECDF from each of these budgets on: the fraction of pairs of run and target
+        that are reached. If no target is reached, there is one infinite budget with the value 0.
     """
     values, weights, _ = _pairs(times)
     if not len(values):
@@ -67,9 +91,10 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
 
 
 def share_reached(times: RunningTimes) -> float:
-    """Return the share of pairs of run and target that are reached at any cost.
+    """Return the fraction of pairs of run and target that are reached.
 
-    The share is from 0 to 1. All tasks have the same weight.
+    The fraction, from 0 to 1, counts pairs that are reached at any cost. ``times`` has the running
+    times on each task, shape ``(runs, targets)``. All tasks have the same weight.
     """
     return float(_pairs(times)[1].sum())
 
@@ -82,13 +107,14 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     times : sequence of arrays, shape (runs, targets)
         Running times on each task. All tasks have the same weight.
     share : float
-        Share of all pairs of run and target, above 0 and up to 1.
+        Fraction of all pairs of run and target that must be reached, above 0 and up to 1.
 
     Returns
     -------
     Estimate
-        The budget. It is infinite if no budget is enough. The ends of the interval are percentiles
-        of a bootstrap that resamples runs within tasks. The interval is not widened for few runs,
+        The budget, in the unit of ``times``, with its 95 % interval. The budget is infinite if so
+        many targets are not reached at any cost. The interval is the percentile interval of a
+        bootstrap that resamples runs within tasks. It is not widened for small numbers of runs,
         because budgets can be infinite. There is no interval if a task has fewer than five runs.
     """
     values, weights, runs = _pairs(times)
@@ -108,10 +134,10 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
 
 
 def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Array]:
-    """Return the 95 % interval of the share of targets that are reached within each budget.
+    """Return the 95 % interval of the ECDF of running times at each budget.
 
-    The ends are percentiles of a bootstrap that resamples runs within tasks. All tasks have the
-    same weight.
+    The interval is the percentile interval of a bootstrap that resamples runs within tasks. All
+    tasks have the same weight.
 
     Parameters
     ----------
@@ -123,7 +149,8 @@ def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Arra
     Returns
     -------
     (ndarray, ndarray), shapes (budgets,)
-        Low and high ends; NaN if a task has fewer than five runs.
+        Lower and upper ends of the interval, fractions from 0 to 1. They are NaN if a task has
+        fewer than five runs.
     """
     sizes = tuple(map(len, times))
     if min(sizes) < MIN_VALUES:
@@ -139,10 +166,10 @@ def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Arra
 
 @lru_cache(maxsize=4)  # most methods have the same number of runs
 def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
-    """Return how often each resample draws each run, shape ``(resamples, runs)``.
+    """Return how often each bootstrap sample draws each run, shape ``(resamples, runs)``.
 
-    ``sizes`` are the numbers of runs on each task, in order. There are 1,999 resamples; for very
-    many runs fewer, but at least 200. The array is cached: do not change it.
+    ``sizes`` has the number of runs on each task. There are 1,999 bootstrap samples. For a very
+    large number of runs there are fewer, but at least 200. The array is cached: do not change it.
     """
     rng = np.random.default_rng(SEED)
     resamples = min(FEWER_RESAMPLES, max(_MAX_DRAWN_RUNS // sum(sizes), 200))
@@ -156,10 +183,15 @@ def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
 
 @lru_cache(maxsize=4)
 def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
-    """Return the trials of each run that improved its best reward, and the new best rewards.
+    """Return the learning curve of each run: the trials that improved its best reward.
 
-    The keys are run ids. Runs without rewards of trials are left out. Trials are numbered from 1.
-    Rewards are in negative ticks. Both arrays have shape ``(n,)``.
+    Returns
+    -------
+    dict of str to (ndarray, ndarray)
+        Maps the id of each run to two arrays, shape ``(n,)`` each: the numbers of the trials, from
+        1, whose reward was higher than those of all earlier trials, and these rewards (negative
+        ticks). Runs whose rewards of trials are not stored are left out. The dict is cached: do not
+        change it.
     """
     by_run = {}
     for run_id, rewards in study.rewards():
@@ -170,10 +202,19 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
 
 
 def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
-    """Return a run's best reward (in negative ticks) after each of some numbers of trials.
+    """Return the best reward of a run after each given number of trials.
 
-    ``steps`` are the trials and rewards of the run in :func:`improvements`. The result has the
-    shape of ``trials``. It is NaN before the first reward.
+    Parameters
+    ----------
+    steps : (ndarray, ndarray)
+        Learning curve of the run: its entry in the dict of :func:`improvements`.
+    trials : array_like of int
+        Numbers of trials, of any shape.
+
+    Returns
+    -------
+    ndarray, of the shape of ``trials``
+        Best rewards so far, in negative ticks. They are NaN before the first completed trial.
     """
     numbers, rewards = steps
     return np.asarray(np.append(math.nan, rewards)[np.searchsorted(numbers, trials, "right")])
@@ -181,11 +222,11 @@ def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
 
 @lru_cache(maxsize=4)
 def target_ranges(study: Study) -> dict[str, tuple[float, float]]:
-    """Return the two rewards between which the targets of each task lie, by task name.
+    """Return a dict that maps each task's name to the range of its targets.
 
-    They are :attr:`.Study.corrective_best` and the best known reward, both in negative ticks. A
-    task is left out if one of the two is missing, or if both are equal. In a world with noise there
-    are no targets, because the reward of a single trial there is partly luck.
+    The range goes from :attr:`.Study.corrective_best` to the best known reward, both in negative
+    ticks. A task is left out if one of the two rewards is missing, or if both are equal. The dict
+    is empty in a world with noise, where the reward of a single trial is partly luck.
     """
     if study.is_noisy:
         return {}
@@ -198,32 +239,33 @@ def target_ranges(study: Study) -> dict[str, tuple[float, float]]:
 def times_of(
     study: Study, task: str, label: str, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> Array:
-    """Return the cost at which each run of a method on a task reached each target.
+    """Return the running times of a method on a task.
 
     Parameters
     ----------
     study : Study
     task : str
-        A task of :func:`target_ranges`.
+        Name of a task that has targets (:func:`target_ranges`).
     label : str
         Label of the method.
-    spend : str
-        The cost: ``trials``, ``forward_kinematics`` or ``solve_s``.
+    spend : {"trials", "forward_kinematics", "solve_s"}
+        The cost: number of trials, number of forward-kinematics evaluations, or wall time in s.
     shares : tuple of float
-        Targets, as shares of the distance from the corrective process alone to the optimum.
+        Targets, as fractions of the distance from the reward of the corrective process alone (0) to
+        the best known reward (1). A target is rounded up to integer ticks.
 
     Returns
     -------
     ndarray, shape (runs, targets)
-        Infinite for a target that no trial of the run reached, and for a failed run. A solved run
-        whose cost is unknown has no row.
+        Running times, in the unit of the cost. They are infinite for a target that no trial of the
+        run reached, and for a failed run. A solved run whose cost is unknown has no row.
 
     Notes
     -----
-    - A run without rewards of trials reaches the targets of its solution at its end.
+    - A run whose rewards of trials are not stored reaches the targets of its solution at its end.
     - Forward-kinematics evaluations and time (:func:`solve_times`) are only known for a whole run.
-      They are spread evenly over its trials, although early trials took 0.6 to 3.4 times as many
-      evaluations.
+      They are spread evenly over its trials. In truth, early trials took 0.6 to 3.4 times as many
+      evaluations as the average trial.
     """
     initial, optimum = target_ranges(study)[task]
     targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)
@@ -246,11 +288,21 @@ def times_of(
 
 
 def solve_times(runs: pd.DataFrame) -> pd.Series:
-    """Return the wall time of solving (in s) for the runs that were made in warm processes.
+    """Return the wall time of solving of each run in a warm process.
 
-    A process is warm if it has performed the method before. If no run was made in a warm process,
-    the times of all runs are returned. A run whose time of solving is 0 or missing has its total
-    wall time. The result keeps the index of ``runs``.
+    A process is warm if it has performed the method before, so that compiling does not count. If no
+    run was made in a warm process, the times of all runs are returned.
+
+    Parameters
+    ----------
+    runs : DataFrame
+        Runs, with columns ``solve_s`` and ``wall_s`` (in s) and ``warm``.
+
+    Returns
+    -------
+    Series
+        Times in s, with the index of the selected runs: ``solve_s``, or ``wall_s`` for a run whose
+        ``solve_s`` is 0 or missing.
     """
     times = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
     warm = runs.warm.to_numpy(bool, na_value=False)
@@ -259,9 +311,10 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 @lru_cache(maxsize=4)
 def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
-    """Return the runs on ranked tasks with targets (:func:`target_ranges`), by label of the method.
+    """Return a dict that maps each method's label to its runs on tasks with targets.
 
-    Methods that did not run on all of these tasks are left out.
+    The tasks are those of :func:`.ranked_tasks` that have targets (:func:`target_ranges`). Methods
+    that did not run on all of these tasks are left out. The dict is cached: do not change it.
     """
     tasks = [task for task in ranked_tasks(study) if task in target_ranges(study)]
     of_methods = {}
@@ -275,14 +328,18 @@ def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
 def times_on_tasks(
     study: Study, runs: pd.DataFrame, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> list[Array]:
-    """Return :func:`times_of` for each cell of a method's runs, in order."""
+    """Return the running times of a method on each of its tasks (:func:`times_of`).
+
+    ``runs`` are the method's runs. The list has an array, shape ``(runs, targets)``, for each pair
+    of task and label in ``runs``, in the order of the rows.
+    """
     return [times_of(study, *cell, spend, shares) for cell in cells_of(runs)]
 
 
 def runtimes(
     results: str | Path | Study, *, targets: Sequence[float] | Array = TARGETS
 ) -> pd.DataFrame:
-    """Return the share of targets that each method reaches within a budget (ECDF of running times).
+    """Return the share of targets that each method reaches within a budget: its ECDF.
 
     Only methods that ran on all ranked tasks with targets are included. A failed run reaches no
     target. All tasks have the same weight.
@@ -292,30 +349,32 @@ def runtimes(
     results : str, Path or Study
         A results folder, or its study.
     targets : sequence of float, shape (n,), optional
-        Shares of the distance from the corrective process alone, with its best hands, to the
-        optimum, above 0 and up to 1; by default 0.05, 0.1, ..., 1. Targets are rounded up to
-        integer ticks.
+        Reward targets, as fractions of the distance from the reward of the corrective process alone
+        with its best hands (0) to the best known reward (1). They are above 0 and up to 1; by
+        default 0.05, 0.1, ..., 1. Each target reward is rounded up to integer ticks.
 
     Returns
     -------
     pandas.DataFrame
-        A row for each budget at which the share rises:
+        A row for each step of the ECDF of each method and cost:
 
         - ``method``: label of the method;
         - ``spend``: the cost: ``trials``, ``forward_kinematics`` (evaluations) or ``solve_s``
           (seconds). The last two are spread evenly over the trials of a run;
-        - ``budget``: in the unit of the cost;
-        - ``share``: share of the pairs of run and target that are reached within the budget.
+        - ``budget``: budget at which the ECDF rises, in the unit of the cost;
+        - ``share``: value of the ECDF from this budget on: the fraction of the pairs of run and
+          target that are reached within the budget.
 
         A method that reaches no target has one row for each cost, with share 0 and an infinite
-        budget. If a cost of a method is unknown on a task, the method has no rows for it.
+        budget. A method whose cost is unknown on a task has no rows for this cost.
 
     Raises
     ------
     CoarticError
-        The folder is not a results folder, it has runs in several worlds or in a world with noise,
-        targets are out of bounds, or no task has a best known reward above the reward of the
-        corrective process alone.
+        - The folder is not a results folder.
+        - It has runs in several worlds, or in a world with noise.
+        - A target is not above 0 and up to 1.
+        - No task has a best known reward above the reward of the corrective process alone.
     """
     study = results if isinstance(results, Study) else load(results)
     if study.is_noisy:
@@ -331,7 +390,10 @@ def runtimes(
             f"targets are {brief_value(targets)}; they must be numbers above 0 and up to 1"
         )
     if not target_ranges(study):
-        raise CoarticError("no task has a best known reward above the corrective process alone")
+        raise CoarticError(
+            f"{study.folder} has no task whose best known reward is above the reward of the "
+            "corrective process alone; running times need one, because targets lie between the two"
+        )
     rows = []
     for name, runs in runs_with_targets(study).items():
         for spend in SPENDS:
@@ -343,31 +405,45 @@ def runtimes(
 
 
 def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
-    """Return the share of targets that methods reach within a number of trials.
+    """Return the ECDF of running times of the methods in a frame of your own.
+
+    The running time of a run for a target is the number of trials after which the run reached the
+    target. The ECDF maps a number of trials to the share of targets reached within these trials.
 
     Parameters
     ----------
     frame : DataFrame
-        With columns ``method``, ``task``, ``run``, ``trials`` (made so far, from 1), ``reward`` and
-        ``best_known`` (negative ticks): a row for each improvement of a run, or for its end. If
-        there is a column ``setting``, each setting of a method counts as a method.
+        A row for each improvement of a run (or only a row for its end), with the columns
+
+        - ``method``, ``task`` and ``run``: names of the method and the task, and name or number of
+          the run. If there is a column ``setting``, each setting of a method counts as a method;
+        - ``trials``: number of trials that the run had made, from 1;
+        - ``reward``: best reward of the run so far, negative ticks; NaN for a failed run;
+        - ``best_known``: best known reward of the task, negative ticks.
     targets : sequence of float
-        Gaps to the best known reward, such as ``[0.1, 0.05, 0.01]``.
+        Gaps to the best known reward, as fractions from 0 to 1, such as ``[0.1, 0.05, 0.01]``.
 
     Returns
     -------
     DataFrame
-        A row for each number of trials at which a method's share rises: ``method``, ``trials`` and
-        ``share``, the share of all pairs of run and target that are reached within these trials.
-        All tasks have the same weight. A run without a reward reaches no target, and on a task
-        without runs of the method no target is reached. A method that reaches no target has one
-        row, with share 0 and infinite trials.
+        A row for each step of the ECDF of each method:
+
+        - ``method``: name of the method;
+        - ``trials``: number of trials at which the ECDF rises;
+        - ``share``: value of the ECDF from there on: the fraction of all pairs of run and target
+          that are reached within these trials.
+
+        All tasks have the same weight. A run without a reward reaches no target. On a task without
+        runs of the method, no target is reached. A method that reaches no target has one row, with
+        share 0 and infinite trials.
 
     Raises
     ------
     CoarticError
-        A column is missing or a reward is wrong (:func:`ranking`), trials are below 1, targets are
-        not gaps, or the frame has no best known reward.
+        - A column is missing, or a reward is wrong (:func:`ranking`).
+        - ``trials`` is below 1, or the reward of a run falls.
+        - A target is not from 0 to 1.
+        - The frame has no best known reward.
 
     Examples
     --------
@@ -400,7 +476,10 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
             "ticks)"
         )
     if not frame.best_known.notna().any():
-        raise CoarticError("the frame has no best_known reward; targets need one")
+        raise CoarticError(
+            "column best_known has no reward; targets need the best known reward of at least one "
+            "task"
+        )
     tasks, rows = frame.task[frame.best_known.notna()].unique(), []
     for method, of_method in frame.groupby("method", sort=False):
         times = []

@@ -1,7 +1,7 @@
-"""Signatures of coarticulation in the movements of solutions.
+"""Measure coarticulation in the movements of solutions.
 
-A signature is a number for each run of a method on a task (:data:`SIGNATURES`). At a goal that two
-tasks share, :class:`TwoContexts` compares the postures of their runs.
+A signature of coarticulation is a number for each run of a method on a task (:data:`SIGNATURES`).
+:class:`TwoContexts` compares the postures of runs on two tasks, at a goal that the tasks share.
 
 Notation, for run i and goal g = 1..G:
 
@@ -11,11 +11,13 @@ Notation, for run i and goal g = 1..G:
 - A reach by the corrective process from q to goal g with hand h takes r(q, g, h) ticks, and ends at
   configuration R(q, g, h).
 
-A signature has shape ``(n,)`` for n runs, and is NaN for a run without this signature.
+A signature of n runs is an array of shape ``(n,)``. It is NaN for a run without this signature.
 
-Configurations mix length units (base) and rad (joints), as the joint-space distance of the model
-does. Permutation tests exchange whole runs. Runs are exchangeable if the context has no effect. The
-tests assume no distribution.
+A configuration has two coordinates in length units (base), and the others in rad (joints).
+Distances between configurations mix the two units, as the joint-space distance of the model does.
+
+Permutation tests exchange whole runs. Under the null hypothesis that the context has no effect,
+runs are exchangeable. The tests assume no particular distribution.
 """
 
 from __future__ import annotations
@@ -56,27 +58,27 @@ from coartic.tasks.task import hands_of
 
 @dataclass(frozen=True)
 class Solutions:
-    """Executed solutions of n runs of one method with one setting on one task with G goals."""
+    """The executed solutions of n runs of a method on a task with G goals."""
 
     task: Task
     label: str
-    """Label: id of the method with its setting, or ``recorded``."""
+    """Label of the method: its id with its setting, or ``recorded`` for recorded trials."""
     runs: tuple[Execution, ...]
     """Executions of the solutions, one for each run."""
     run_ids: tuple[str, ...] = ()
     """Ids of the runs, in the order of ``runs``; empty if the runs have no ids."""
     unfinished: int = 0
-    """Number of recorded trials in which not all goals were hit. They are not among ``runs``. It is
-    0 if the runs are not recorded."""
+    """Number of recorded trials in which not all goals were hit; these trials are not among
+    ``runs``. It is 0 for runs of a method."""
     deterministic: bool = False
-    """True if all runs of the method on this task are equal by construction."""
+    """True if the method is deterministic, so that all its runs on this task are equal."""
     model: MotionModel = PAPER
-    """The world, without motor noise, in which the runs were executed, and in which the corrective
-    process is compared with them."""
+    """Motion model, without motor noise, with which the runs were executed. The reaches of the
+    corrective process to which they are compared have the same model."""
 
     @cached_property
     def hands(self) -> NDArray[np.int64]:
-        """Hands that hit the goals, shape ``(n, G)``: 0 for left, 1 for right, as in HANDS."""
+        """Hands that hit the goals, shape ``(n, G)``: 0 for left, 1 for right."""
         hands = [[HANDS.index(hand) for hand in hands_of(run.hands)] for run in self.runs]
         return np.array(hands, dtype=np.int64).reshape(-1, len(self.task.goals))
 
@@ -88,10 +90,10 @@ class Solutions:
 
     @cached_property
     def starts(self) -> Array:
-        """Configurations at the start of each subtask, shape ``(n, G, dof)``.
+        """Configurations at the start of each subtask, shape ``(n, G, dof)``, length units and rad.
 
-        A subtask starts at the hit of the previous goal. The first subtask starts at the start of
-        the task.
+        The subtask of goal 1 starts at the start of the task. Each later subtask starts at the
+        configuration in which the previous goal was hit.
         """
         starts = np.empty_like(self.configurations)
         starts[:, 0], starts[:, 1:] = self.task.q0, self.configurations[:, :-1]
@@ -99,10 +101,11 @@ class Solutions:
 
     @cached_property
     def against_same_hands(self) -> Array:
-        """Ticks of each subtask less those of the corrective process alone, shape ``(n, G)``.
+        """Ticks of each subtask minus those of the corrective process alone, shape ``(n, G)``.
 
-        The corrective process uses the hands of the run. The values of a run are NaN if the
-        corrective process does not complete the task with them.
+        In the notation of the module: t(i, g) − c(i, g). The corrective process has the hand
+        sequence of the run. If it does not complete the task with these hands, all values of the
+        run are NaN.
         """
         hand_sequences = {run.hands for run in self.runs}
         references = {
@@ -116,14 +119,15 @@ class Solutions:
 
 
 def initial_solution(task: Task, model: MotionModel = PAPER) -> Execution | None:
-    """Return the execution of the corrective process alone with the initial hands of a task.
+    """Return the execution of the corrective process alone with a task's initial hands, or None.
 
-    ``model`` is a world without noise. Returns None if
+    ``model`` is a motion model without noise. The result is None if
 
-    - the corrective process does not complete the task with the initial hands;
-    - the task does not name initial hands, and no hand sequence that its policy allows completes
-      the task;
-    - the task does not name initial hands, and there are more than 4,096 hand sequences to try.
+    - the task names its initial hands, and the corrective process does not complete the task with
+      them;
+    - the task has a policy instead, and the corrective process completes the task with no hand
+      sequence that the policy allows;
+    - the task has a policy instead, and there are more than 4,096 hand sequences to try.
     """
     try:
         execution = corrective_trial(task, initial_hands(task, model=model), model=model)
@@ -140,25 +144,31 @@ def _other(hand: Hand) -> Hand:
 def isolated_reaches(
     task: Task, q: Array, goals: ArrayLike, hands: ArrayLike, model: MotionModel = PAPER
 ) -> tuple[Array, Array]:
-    """Reach single goals by the corrective process, and return ticks and final configurations.
+    """Reach for single goals by the corrective process, each reach on its own.
 
-    These are r(q, g, h) and R(q, g, h) in the notation of this module.
+    The results are r(q, g, h) and R(q, g, h) in the notation of this module.
 
     Parameters
     ----------
     task : Task
+        Task that has the robot and the goals.
     q : ndarray, shape (..., dof)
-        Configurations at the start, in length units and rad.
-    goals, hands : array_like of int, shapes that broadcast to (...)
-        Numbers of goals, from 1, and indices of hands in HANDS.
+        Configuration at the start of each reach, in length units and rad.
+    goals : array_like of int
+        Number of the goal of each reach, from 1. The shape must broadcast to ``q.shape[:-1]``.
+    hands : array_like of int
+        Hand of each reach, as its index in HANDS: 0 for left, 1 for right. The shape must broadcast
+        to ``q.shape[:-1]``.
     model : MotionModel
-        A world without noise.
+        Motion model without noise.
 
     Returns
     -------
-    (ndarray, shape (...), ndarray, shape (..., dof))
-        Ticks, and configurations at the end. Ticks are 0 if the hand is within the goal at the
-        start, and NaN if the reach ends without a hit.
+    ndarray, shape (...)
+        Ticks of each reach: 0 if the hand is within the goal at the start, and NaN if the reach
+        ends without a hit.
+    ndarray, shape (..., dof)
+        Configuration at the end of each reach, in length units and rad.
 
     Raises
     ------
@@ -173,8 +183,9 @@ def isolated_reaches(
         fit = False
     if not fit or not np.isin(goals, numbers).all():
         raise ValueError(
-            f"goals must be from 1 to {len(numbers)}, and the shapes of goals and hands must "
-            f"broadcast to {shape}: q has shape {q.shape}"
+            f"goals are {np.asarray(goals)}, hands have shape {np.shape(hands)}, and q has shape "
+            f"{q.shape}; goals must be from 1 to {len(numbers)}, and the shapes of goals and hands "
+            f"must broadcast to {shape}"
         )
     reached = reach_goals(
         task.robot,
@@ -190,7 +201,9 @@ def isolated_reaches(
 
 
 def gain_at_next(runs: Solutions) -> Array:
-    """Return the ticks that postures save for the next goal, shape ``(n, G − 1)``.
+    """Return the ticks that each posture saves for the next goal.
+
+    The result has shape ``(n, G − 1)``. For run i and goal g < G, the value is
 
     r(q', g + 1, h(i, g + 1)) − r(q'', g + 1, h(i, g + 1)),
 
@@ -198,11 +211,11 @@ def gain_at_next(runs: Solutions) -> Array:
 
     - q' = R(q(i, g − 1), g, h(i, g)) is the posture in which the corrective process would have hit
       goal g;
-    - q'' is q(i, g) with the joints of the idle arm as in q', so that movements of the idle arm do
-      not count.
+    - q'' is the posture q(i, g) of the run, but with the joints of the idle arm as in q', so that
+      movements of the idle arm do not count.
 
-    A value is positive if the movement to the next goal is shorter from q'', and NaN if a reach
-    ends without a hit.
+    The value is positive if the corrective process reaches the next goal in fewer ticks from q''
+    than from q'. It is NaN if one of the three reaches ends without a hit.
     """
     task, hands = runs.task, runs.hands
     goals = 1 + np.arange(len(task.goals))
@@ -221,14 +234,17 @@ def gain_at_next(runs: Solutions) -> Array:
 
 
 def ticks_slower(runs: Solutions) -> Array:
-    """Return how many ticks slower than the fastest hand each chosen hand is, shape ``(n, G)``.
+    """Return how many ticks slower the chosen hand is than the fastest hand.
 
-    r(q(i, g − 1), g, h(i, g)) − min over hands h of r(q(i, g − 1), g, h)
+    The result has shape ``(n, G)``. For run i and goal g, the value is
 
-    Both reaches start where the previous goal was hit. The value is the number of ticks that the
-    corrective process needs from there with the chosen hand, minus the number that it needs with
-    the fastest hand. The value is above 0 if another hand would be faster for this goal. The value
-    is infinite if the reach with the chosen hand ends without a hit.
+    r(q(i, g − 1), g, h(i, g)) − min over the task's hands h of r(q(i, g − 1), g, h).
+
+    Both reaches start in the configuration in which the previous goal was hit. The first term is
+    the number of ticks that the corrective process needs with the chosen hand, and the second term
+    is the number that it needs with the fastest hand. The value is 0 if the chosen hand is the
+    fastest, and above 0 if another hand is faster. It is infinite if the reach with the chosen hand
+    ends without a hit.
     """
     goals = 1 + np.arange(len(runs.task.goals))
     isolated = np.full((len(HANDS), *runs.hands.shape), np.inf)
@@ -242,23 +258,20 @@ def ticks_slower(runs: Solutions) -> Array:
 
 
 def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
-    """Return how much of the path to its next goal the idle hand covers.
+    """Return how much nearer the idle hand is to its next goal, at each goal.
 
-    The result has a share for each goal, shape ``(G,)``:
+    At the hit of goal g, the idle hand is the hand that does not hit goal g. The value is
 
     (d_held(g) − d(g)) / d_initial(g),
 
     where
 
-    - d(g) is the distance of the idle hand to this hand's next goal, at the hit of goal g;
-    - d_held(g) is this distance if the idle arm had not moved its joints since its own last hit (or
-      the start);
+    - d(g) is the distance, at the hit of goal g in ``run``, between the idle hand and the next goal
+      that this hand hits;
+    - d_held(g) is the same distance if the joints of the idle arm were still as they were at the
+      last hit by the idle hand, or at the start of the task;
     - d_initial(g) is the distance of the same hand to the same goal at the hit of goal g in
       ``initial``.
-
-    The share is NaN if the idle hand hits no later goal (always under exploration condition 1), or
-    if d_initial(g) is 0. Otherwise it is 0 if the joints of the idle arm do not move (always under
-    condition 3), even if the base moves.
 
     Parameters
     ----------
@@ -266,7 +279,15 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
     run : Execution
         A completed run.
     initial : Execution
-        A completed run of the corrective process alone with the task's initial hands.
+        The completed run of the corrective process alone with the task's initial hands.
+
+    Returns
+    -------
+    ndarray, shape (G,)
+        A fraction for each goal. It is NaN if the idle hand hits no later goal (always under
+        exploration condition 1), or if d_initial(g) is 0. Otherwise it is 0 if the joints of the
+        idle arm have not moved (always under condition 3), even if the base has moved. It is
+        negative if the idle arm has moved its hand away from its next goal.
     """
     now, hands = run.configurations, hands_of(run.hands)
     held = np.array(now)
@@ -290,49 +311,53 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
 
 @dataclass(frozen=True)
 class Signature:
-    """A signature of coarticulation, with all that tables and pages say of it."""
+    """A signature of coarticulation, with the words and formats of tables and pages for it."""
 
     name: str
-    """Name, such as ``other arm``. Names of columns have ``_`` for spaces."""
+    """Name, such as ``other arm``. Names of columns have underscores instead of spaces."""
     each: Callable[[Solutions], Array]
-    """Function that returns the signature of each run, shape ``(n,)``. It is NaN for a run without
-    the signature, and an empty array for no runs."""
+    """Function of n runs that returns the signature of each run, shape ``(n,)``. A value is NaN for
+    a run without the signature. The array is empty if there are no runs."""
     heading: str
-    """Heading of its column, with the unit."""
+    """Heading of the signature's column in tables, with its unit."""
     decimals: int
-    """Number of decimals in tables."""
+    """Number of decimals of the signature in tables."""
     words: str
-    """What the signature measures, in words with its unit."""
+    """Short description of what the signature measures, with its unit."""
     definition: str
-    """Definition on the site: sentences after the name and the unit."""
+    """Definition of the signature on the site, which follows its name and unit there."""
     in_latex: str = ""
-    """Columns that LaTeX also has: ``value``, ``value and control`` (of random search), or none."""
+    """Columns that LaTeX tables also have: ``value`` (the method's), ``value and control`` (the
+    method's and that of random search), or empty for none."""
     by_hands: bool = True
-    """True to compare it only with runs that have the same hand sequence."""
+    """True if runs are only compared with runs of random search with the same hand sequence."""
 
     @property
     def column(self) -> str:
-        """Name of its column."""
+        """Name of the signature's column in tables and frames, such as ``other_arm``."""
         return self.name.replace(" ", "_")
 
 
 def hand(runs: Solutions) -> Array:
-    """Return the share of goals that are not hit with their fastest hand, shape ``(n,)``.
+    """Return the share of goals that a run hits with a slower hand, shape ``(n,)``.
 
-    The fastest hand is that for the goal alone. The share is 1 − mean over g < G of a(i, g) of
-    :func:`as_in_isolation`: the last goal does not count. The share is NaN on a task for one hand,
-    and on a task with one goal.
+    The chosen hand is slower if the corrective process would reach this goal, on its own, in fewer
+    ticks with another hand. For run i, the share is 1 minus the mean over the goals g < G of
+    a(i, g) (:func:`as_in_isolation`), a fraction. The last goal does not count. The share is NaN on
+    a task for one hand, and on a task with one goal.
     """
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
 
 
 def as_in_isolation(runs: Solutions) -> Array:
-    """Return 1 where the chosen hand is the fastest for the goal alone, otherwise 0.
+    """Return whether each goal is hit with the hand that is fastest for it alone.
 
-    The shape is ``(n, G)``. Values are NaN on a task for one hand. a(i, g) is 1 if
+    The result a(i, g) has shape ``(n, G)``. It is 1 if
 
-    r(q(i, g − 1), g, h(i, g)) = min over h of r(q(i, g − 1), g, h).
+    r(q(i, g − 1), g, h(i, g)) = min over the task's hands h of r(q(i, g − 1), g, h),
+
+    and 0 otherwise. All values are NaN on a task for one hand.
     """
     if not runs.runs or len(runs.task.hands) < 2:
         return np.full((len(runs.runs), len(runs.task.goals)), np.nan)
@@ -340,14 +365,15 @@ def as_in_isolation(runs: Solutions) -> Array:
 
 
 def other_arm(runs: Solutions) -> Array:
-    """Return how much of the path to its next goal the idle hand covers.
+    """Return how much nearer the idle hand is to its next goal, on average.
 
-    The result has a share for each run, shape ``(n,)``: the mean of :func:`preshaping` over the
-    goals for which this is not NaN. The share is negative if the idle hand moves away on average.
-    It is NaN
+    The result has a fraction for each run, shape ``(n,)``: the mean of :func:`preshaping` over the
+    goals at which :func:`preshaping` is not NaN. The fraction is negative if the idle arm moves its
+    hand away from its next goal on average. It is NaN
 
-    - on a task for one hand, or without an initial solution (:func:`initial_solution`);
-    - for a run in which :func:`preshaping` is NaN for all goals.
+    - for all runs on a task for one hand, or on a task without an initial solution
+      (:func:`initial_solution`);
+    - for a run in which :func:`preshaping` is NaN at all goals.
     """
     initial = initial_solution(runs.task, runs.model)
     if not runs.runs or initial is None or len(runs.task.hands) < 2:
@@ -359,12 +385,12 @@ def other_arm(runs: Solutions) -> Array:
 
 
 def arm(runs: Solutions) -> Array:
-    """Return how many ticks the chosen posture at a goal saves for the next goal, on average.
+    """Return the mean number of ticks that postures save for the next goal.
 
-    The posture is compared with that in which the corrective process would have hit the goal. Only
-    the base and the chosen arm count. The result has shape ``(n,)``: the mean of
-    :func:`gain_at_next` over goals g < G. It is NaN on a task with one goal, and for a run with a
-    gain that is NaN.
+    The posture is compared with the posture in which the corrective process would have hit the
+    goal. Only the base and the arm that hits the goal count. The result has a mean for each run, in
+    ticks, shape ``(n,)``: the mean of :func:`gain_at_next` over the goals g < G. It is NaN on a
+    task with one goal, and for a run in which a value of :func:`gain_at_next` is NaN.
     """
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
@@ -452,19 +478,19 @@ SIGNATURES = {
         ),
     )
 }
-"""Signatures by name, in the order of tables. ``first`` is t(i, 1) − c(i, 1), and ``whole`` is
-Σ_g c(i, g) − t(i, g). Both are NaN if the corrective process does not complete the task with the
-hands of the run."""
+"""Maps the name of each signature to the signature, in the order of tables. In the notation of this
+module, ``first`` is t(i, 1) − c(i, 1), and ``whole`` is the sum over g of c(i, g) − t(i, g). Both
+are NaN if the corrective process does not complete the task with the hands of the run."""
 
 
 IN_MEMORY = 500
-"""Largest number of permutations or resamples of runs in memory at once."""
+"""Number of permutations or bootstrap samples whose runs are in memory at the same time."""
 
 
 def _groups(*groups: Numbers) -> list[Array]:
-    """Return groups of runs as arrays of float64.
+    """Return groups of runs as arrays of float64, shape ``(runs, dof)`` each.
 
-    Raises ValueError unless all have shape ``(runs, dof)``, the same ``dof``, and at least one run.
+    Raises ValueError if a group has another shape or no run, or if the groups differ in ``dof``.
     """
     shapes = [np.shape(group) for group in groups]
     if any(len(shape) != 2 or shape[1:] != shapes[0][1:] or 0 in shape for shape in shapes):
@@ -476,26 +502,40 @@ def _groups(*groups: Numbers) -> list[Array]:
 
 
 def distance_of_means(first: Array, second: Array) -> float:
-    """Return the distance ‖mean(first) − mean(second)‖ of the mean configurations of two contexts.
+    """Return the Euclidean distance between the mean configurations of two contexts.
 
-    ``first`` and ``second`` have shape ``(runs, dof)``. The distance mixes length units and rad.
-    Raises ValueError for other shapes.
+    ``first`` and ``second`` have the configurations of the runs in each context, shape
+    ``(runs, dof)``. The distance ‖mean(first) − mean(second)‖ mixes length units and rad. Raises
+    ValueError for other shapes.
     """
     first, second = _groups(first, second)
     return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
 
 
 def standardised_posture_difference(first: Array, second: Array) -> float:
-    """Return the distance of mean configurations in pooled standard deviations within contexts.
+    """Return the distance between two mean configurations, in pooled standard deviations (SD).
 
     d = ‖m₁ − m₂‖ / s, s² = (Σ‖x − m₁‖² + Σ‖x − m₂‖²) / (n₁ + n₂ − 2),
 
-    where m₁ and m₂ are the mean configurations of the n₁ runs of the first context and of the n₂
-    runs of the second. d is a multivariate form of Cohen's d (Cohen 1988), from 0 to ∞. If the
-    context has no effect, d² is about 1/n₁ + 1/n₂ on average, not 0. d is NaN if no context has two
-    runs, or if s = 0.
+    where m₁ is the mean configuration of the n₁ runs in the first context, m₂ is the mean
+    configuration of the n₂ runs in the second context, and s is the pooled standard deviation
+    within contexts. d is a multivariate form of Cohen's d (Cohen 1988), from 0 to ∞. If the context
+    has no effect, d² is about 1/n₁ + 1/n₂ on average, not 0.
 
-    ``first`` and ``second`` have shape ``(runs, dof)``. Raises ValueError for other shapes.
+    Parameters
+    ----------
+    first, second : ndarray, shape (runs, dof)
+        Configurations in the two contexts, in length units and rad.
+
+    Returns
+    -------
+    float
+        d. It is NaN if both contexts have a single run, or if s = 0.
+
+    Raises
+    ------
+    ValueError
+        An array has another shape.
     """
     first, second = _groups(first, second)
     freedom = len(first) + len(second) - 2
@@ -515,23 +555,24 @@ def posture_difference_below(
     standardised: bool = True,
     resamples: Resamples = RESAMPLES,
 ) -> float:
-    """Test that the posture difference is below a bound, by the bootstrap.
+    """Test whether the posture difference of two contexts is below a bound, by the bootstrap.
 
-    Bootstrap samples draw runs within each context. p = (1 + samples whose posture difference is at
-    least ``bound``) / (1 + resamples). Noise makes distances larger, so p tends to be too large.
+    Each bootstrap sample draws runs with replacement within each context. p = (1 + number of
+    bootstrap samples whose posture difference is at least ``bound``) / (1 + ``resamples``). Noise
+    makes distances larger, so that p tends to be too large.
 
     Parameters
     ----------
     first, second : array_like, shape (runs, dof)
         Configurations in the two contexts, in length units and rad.
     bound : float
-        The bound, in the unit of the posture difference.
+        The bound: in SDs if ``standardised``, otherwise in the unit of the coordinates.
     rng : numpy.random.Generator
         Generator of the bootstrap samples.
     standardised : bool
-        True if the posture difference is :func:`standardised_posture_difference` (in SDs), False if
-        it is :func:`distance_of_means`. If True, a sample without spread counts as at least
-        ``bound``.
+        True if the posture difference is :func:`standardised_posture_difference`, False if it is
+        :func:`distance_of_means`. If True, the posture difference of a bootstrap sample whose SD is
+        0 counts as at least ``bound``.
     resamples : int
         Number of bootstrap samples.
 
@@ -563,10 +604,10 @@ def posture_difference_below(
 def permutation_p(
     first: Array, second: Array, rng: np.random.Generator, *, resamples: Resamples = RESAMPLES
 ) -> float:
-    """Test that mean configurations of two contexts differ by more than chance, by permutation.
+    """Test whether the mean configurations of two contexts differ, by a permutation test.
 
-    The statistic is :func:`distance_of_means`, and the test is one-tailed. It is exact if there are
-    at most ``resamples`` ways to divide the runs.
+    The test statistic is :func:`distance_of_means`, and large distances are extreme. The test is
+    exact if there are at most ``resamples`` ways to divide the runs into two contexts.
 
     Parameters
     ----------
@@ -608,16 +649,17 @@ def beyond_p(
     *,
     resamples: Resamples = RESAMPLES,
 ) -> float:
-    """Test that a method's posture difference exceeds another method's, by permutation.
+    """Test whether one method's posture difference exceeds another's, by a permutation test.
 
-    The posture difference is the distance of the mean configurations in two contexts. The statistic
-    is the difference of the two methods' posture differences. Permutations exchange the runs of
-    both methods within each context.
+    The posture difference of a method is the distance between its mean configurations in two
+    contexts. The test statistic is the posture difference of the first method minus that of the
+    second. Permutations exchange runs of the two methods within each context.
 
     Parameters
     ----------
-    method, other : sequence of arrays, shape (runs, dof)
-        Configurations in each of the two contexts, in length units and rad.
+    method, other : sequence of two arrays, shape (runs, dof)
+        For each method, its configurations in the first and in the second context, in length units
+        and rad.
     rng : numpy.random.Generator
         Generator of the permutations.
     resamples : int
@@ -626,8 +668,8 @@ def beyond_p(
     Returns
     -------
     float
-        p, 0 < p ≤ 1: twice the upper tail, but at most 1. NaN if a method has a single run in a
-        context.
+        p, 0 < p ≤ 1: twice the upper-tail p-value, but at most 1. It is NaN if a method has a
+        single run in a context.
 
     Raises
     ------
@@ -667,41 +709,45 @@ def beyond_p(
 
 
 def _means_of(pool: Array, rows: NDArray[Any]) -> tuple[Array, Array]:
-    """Return the mean of the configurations that each row picks, and the mean of the others.
+    """Return the means of chosen configurations and of the others, for each resample.
 
-    ``rows`` are rows of indices in ``pool``. Both means have shape ``(rows, dof)``.
+    ``pool`` has configurations, shape ``(N, dof)``. Each row of ``rows``, shape ``(rows, k)``, has
+    the indices of the k configurations that a resample chooses. Both means have shape
+    ``(rows, dof)``.
     """
     total, chosen = pool[rows].sum(axis=1), rows.shape[1]
     return total / chosen, (pool.sum(axis=0) - total) / (len(pool) - chosen)
 
 
 def _distances(first: Array, second: Array) -> Array:
-    """Return the distances of mean configurations, shape ``(rows,)``."""
+    """Return the Euclidean distance between corresponding rows of two arrays, shape ``(rows,)``."""
     return np.asarray(np.linalg.norm(first - second, axis=1))
 
 
 NEXT_APART = 0.1
-"""Smallest distance between the mean next postures of two contexts at which a lean is computed.
+"""Smallest distance between the mean next postures of two contexts for which a lean is computed.
 
-It mixes length units and rad."""
+The distance mixes length units and rad."""
 STANDARD_ERRORS = 3
-"""Smallest distance between the mean next postures, in standard errors, for a lean."""
+"""Smallest distance between the mean next postures of two contexts, in its standard errors, for
+which a lean is computed."""
 MIN_RUNS = 5
-"""Smallest number of runs in each context for the interval of a lean or posture difference."""
+"""Smallest number of runs in each context for which the interval of a lean or of a posture
+difference is computed."""
 
 
 class Lean(NamedTuple):
-    """Lean of postures at a shared goal, as shares of the path to the next posture."""
+    """Lean of postures at a shared goal and at the start, as fractions."""
 
     more: Estimate
-    """Lean at the goal less lean at the start, with its interval for other runs. ``n`` are the
-    numbers of runs in the two contexts. Interpret this number, not the two leans."""
+    """Lean at the shared goal minus lean at the start, with its interval for other runs. ``n`` has
+    the numbers of runs in the two contexts. Interpret this number, not the two leans."""
     at_goal: float
     """Lean of the postures at the shared goal."""
     at_start: float
-    """Lean of the postures from which the movements to the shared goal start: the control."""
+    """Lean of the postures in which the movements to the shared goal start. It is the control."""
     apart: float
-    """Distance between the mean next postures of both contexts; it mixes length units and rad."""
+    """Distance between the mean next postures of the two contexts, in length units and rad."""
 
 
 def lean(
@@ -713,34 +759,37 @@ def lean(
     deterministic: bool = False,
     resamples: Resamples = FEWER_RESAMPLES,
 ) -> Lean:
-    """Return how much of the path to the next posture is covered at a shared goal.
+    """Return how far postures at a shared goal lean towards the next postures.
 
-    In two contexts A and B, the same goal (the shared goal) is followed by different goals. The
-    lean is
+    In two contexts A and B, the robot hits the same goal (the shared goal), and then another goal
+    in each context. The lean is the fraction of the difference between the next postures that is
+    already there at the shared goal:
 
     (p_A − p_B)·(n_A − n_B) / ‖n_A − n_B‖²,
 
-    where p_A and p_B are the mean postures at the shared goal, and n_A and n_B the mean postures in
-    which the next goal is hit. The lean is
+    where p_A and p_B are the mean postures at the shared goal in the two contexts, and n_A and n_B
+    are the mean postures in which the next goals are hit. The lean is
 
     - 0 if the posture at the shared goal does not depend on the next goal;
-    - 1 if it is already the posture for the next goal;
-    - negative if it is on the side away from the posture for the next goal.
+    - 1 if the posture at the shared goal is already the posture of the next goal;
+    - negative if postures at the shared goal differ in the opposite direction.
 
-    The unit of the postures cancels out. The same projection of the start postures is the control:
-    a difference that existed before the movement is not a lean.
+    The lean has no unit. The control is the lean of the postures at the start of the movement to
+    the shared goal, computed by the same formula: a difference that existed before the movement is
+    not an effect of the movement.
 
-    p and n of one run share the noise of that run, which would look like a lean. Therefore p is the
-    mean of the odd runs and n the mean of the even runs, or the other way round; the lean is the
-    mean of both. Noise in n_A − n_B makes a lean smaller: with four coordinates by a ninth if the
-    lean is just applicable, otherwise by less.
+    The postures p and n of the same run share the noise of this run, which would look like a lean.
+    Therefore the runs are divided into odd and even runs. The lean is computed twice, with p from
+    the odd runs and n from the even runs, and the other way round, and the two results are
+    averaged. Noise in n_A − n_B makes a lean smaller: with four coordinates by a ninth if the lean
+    is just applicable, otherwise by less.
 
-    All numbers but ``apart`` are NaN if the lean is not applicable:
+    All numbers except ``apart`` are NaN if the lean is not applicable, that is, if
 
     - ‖n_A − n_B‖ is below :data:`NEXT_APART` in the given coordinates;
-    - ‖n_A − n_B‖ is below three of its standard errors (the root of the summed variances of the
-      means in all coordinates);
-    - a context has a single run, unless ``deterministic``.
+    - ‖n_A − n_B‖ is below three standard errors. The standard error is the square root of the sum,
+      over coordinates and contexts, of the variances of the means;
+    - a context has a single run, and ``deterministic`` is False.
 
     Parameters
     ----------
@@ -751,8 +800,8 @@ def lean(
     rng : numpy.random.Generator
         Generator of the resamples.
     toward : array_like, shape (m, k), optional
-        Values of n_A − n_B from other sources, such as other people. Their mean then replaces
-        n_A − n_B, and p is the mean of all runs.
+        Values of n_A − n_B from m other sources, such as other people. Their mean then replaces
+        n_A − n_B, and p_A and p_B are means over all runs.
     deterministic : bool
         True if all runs of a context are equal by construction, so that one run is enough.
     resamples : int
@@ -761,15 +810,17 @@ def lean(
     Returns
     -------
     Lean
-        The ends of the interval are percentiles of bootstrap samples. Runs are resampled within the
-        odd and within the even runs of each context (with ``toward``, within each context).
-        Deviations from the mean of m runs are multiplied by √(m / (m − 1)). There is no interval if
-        a context has fewer than five runs, or if ``deterministic``.
+        The leans, as fractions, with the interval of their difference. The interval is a percentile
+        interval of bootstrap samples. The odd runs of each context are resampled, and the even
+        runs separately (with ``toward``, all runs of each context). In a group of m runs, the
+        deviations of bootstrap means are multiplied by √(m / (m − 1)). There is no interval if a
+        context has fewer than five runs, or if ``deterministic`` is True.
 
     Raises
     ------
     ValueError
-        An array has another shape, or is empty or not finite.
+        An array has another shape or is empty, the two contexts have different numbers of
+        coordinates, or a posture is not finite.
 
     Examples
     --------
@@ -784,8 +835,8 @@ def lean(
     if contexts[0].shape[1:] != contexts[1].shape[1:]:
         numbers = [runs.shape[2] for runs in contexts]
         raise ValueError(
-            "postures must have the same number of coordinates in both contexts, not "
-            f"{numbers[0]} and {numbers[1]}"
+            f"first has {numbers[0]} coordinates and second {numbers[1]}; both must have the same "
+            "number"
         )
     n = (len(contexts[0]), len(contexts[1]))
     if toward is not None:
@@ -810,9 +861,10 @@ def lean(
         return Lean(Estimate(math.nan, n=n), math.nan, math.nan, apart)
 
     def shares(means: Sequence[Sequence[Array]]) -> Array:
-        """Return the leans at start and goal, shape (..., 2).
+        """Return the leans at the start and at the goal, shape ``(..., 2)``.
 
-        ``means`` has the mean postures, shape (..., 3, k), of the parts of both contexts.
+        ``means`` has, for each context, the mean postures of each part of its runs, shape
+        ``(..., 3, k)``. The parts are the odd and the even runs, or all runs (with ``toward``).
         """
         differences = [one - other for one, other in zip(*means, strict=True)]
         ways = [way]
@@ -848,22 +900,28 @@ def _postures(runs: Numbers) -> Array:
             "run, with three postures: at the start, at the shared goal, and at the next goal"
         )
     if not np.isfinite(postures).all():
-        raise ValueError("the postures of a context have numbers that are not finite")
+        raise ValueError(
+            "the postures of a context have numbers that are not finite; all must be finite"
+        )
     return postures
 
 
 def _variance_of_mean(values: Array) -> float:
-    """Return the summed variance of the means of ``(n, k)`` values; 0 if n is 1."""
+    """Return the variance of the mean of vectors, summed over their coordinates.
+
+    ``values`` has n vectors of k coordinates, shape ``(n, k)``. The result is 0 if n is 1.
+    """
     if len(values) < 2:
         return 0.0
     return float(centred(values).var(axis=0, ddof=1).sum()) / len(values)
 
 
 def _means_drawn(runs: Array, rng: np.random.Generator, resamples: int) -> Array:
-    """Return means of runs that are drawn with replacement, shape ``(resamples, ...)``.
+    """Return the means of bootstrap samples of runs, shape ``(resamples, ...)``.
 
-    ``runs`` has shape ``(m, ...)``. Deviations from the mean are multiplied by √(m / (m − 1)), so
-    that the variance of the means has no bias.
+    ``runs`` has shape ``(m, ...)``. Each bootstrap sample draws m runs with replacement. The
+    deviations of the means from the mean of ``runs`` are multiplied by √(m / (m − 1)), so that
+    their variance is an unbiased estimate of the variance of a mean.
     """
     mean, m = runs.mean(axis=0), len(runs)
     shares = rng.multinomial(m, np.full(m, 1 / m), size=resamples) / m
@@ -872,22 +930,25 @@ def _means_drawn(runs: Array, rng: np.random.Generator, resamples: int) -> Array
 
 
 SAME = 0.01
-"""Posture difference below which postures count as the same: the robot's step.
-
-It mixes length units and rad."""
+"""Posture difference, in length units and rad, below which two postures count as the same. It is
+the length of a step of the robot in the paper's model."""
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
-    """Return the pairs of tasks that share first goals, and how many they share.
+    """Return the pairs of tasks that begin with the same goals.
 
-    The number n counts the shared first goals that are followed by another goal in both tasks. A
-    pair is left out if n is 0, if all goals are equal, or if robot, start, radius, hands or locked
-    base differ.
+    Parameters
+    ----------
+    tasks : mapping of str to Task
+        Maps the name of each task to the task.
 
     Returns
     -------
     list of (str, str, int)
-        Names of both tasks, and n.
+        For each pair, the names of both tasks and the number n of shared goals: goals at the
+        beginning that are the same in both tasks, and are not the last goal of a task. A pair is
+        left out if n is 0, if all goals of the two tasks are equal, or if the tasks differ in
+        robot, start, radius of the goals, hands or locked base.
     """
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
@@ -946,27 +1007,30 @@ def coordinates(task: Task, hand: Hand, part: Part) -> Array:
 
 
 def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
-    """Return the motor-equivalent part and the other part of a difference of configurations Δq.
+    """Divide a difference of configurations into a motor-equivalent part and the other part.
 
-    They are ‖Nᵀ Δq‖ / √dim N and ‖Rᵀ Δq‖ / √dim R, for an orthonormal basis N of the null space of
-    the Jacobian J, and R of its row space. For a random direction the squares of both parts have
-    the same expectation. A difference between contexts is motor-equivalent if the first part is
-    larger than the second: the posture differs, and the hand has the same position.
+    The motor-equivalent part of a difference Δq is in the null space of the Jacobian J: to first
+    order, it does not move the hand. The other part is in the row space of J. Both are per
+    dimension: ‖Nᵀ Δq‖ / √dim N and ‖Rᵀ Δq‖ / √dim R, where N and R are orthonormal bases of the
+    null space and of the row space. If Δq has a random direction, the squares of both parts have
+    the same expectation. A difference between contexts is called motor-equivalent if the first part
+    is larger than the second, so that most of the difference does not move the hand.
 
-    Caveat: for small differences the radius of the goal bounds the second part; nothing bounds the
-    first.
+    Caveat: if differences are small, the radius of the goal bounds the second part, and nothing
+    bounds the first part.
 
     Parameters
     ----------
     difference : ndarray, shape (k,)
-        Δq of the k coordinates that can move, in length units and rad.
+        Difference Δq of the k coordinates that can move, in length units and rad.
     jacobian : ndarray, shape (2, k)
-        J.
+        Jacobian J of the hand's position for these coordinates.
 
     Returns
     -------
     (float, float)
-        Both parts; NaN if the space has dimension 0.
+        The motor-equivalent part and the other part, in length units and rad. A part is NaN if its
+        space has dimension 0.
 
     Raises
     ------
@@ -1001,15 +1065,15 @@ class TwoContexts:
     first, second : Solutions
         Runs on two tasks that share the goal, as ``study.executed(task, method)`` returns them.
     goal : int
-        Number of the goal, from 1.
+        Number of the shared goal, from 1. The lean needs a goal that is not the last of a task.
     hand : {"left", "right"}
-        Hand that hits the goal.
+        Hand that hits the goal in the compared runs.
     part : {"all", "base", "joints"}
-        Coordinates that are compared: all, the two of the base (length units), or the joints of
-        the arm of ``hand`` (rad). The posture difference, the lean and their tests are of this
-        part; :attr:`parts` is always of all. The lean of a part is along the difference of the
-        next postures in the same coordinates, so the leans of base and joints do not add up to
-        that of all.
+        Coordinates that are compared: all of them, the two of the base (length units), or the
+        joints of the arm of ``hand`` (rad). The posture difference, the lean and their tests are
+        computed in these coordinates; :attr:`parts` is always computed from all coordinates. The
+        lean of a part is measured along the difference of the next postures in the same
+        coordinates. Therefore the leans of base and joints do not add up to the lean of all.
 
     Raises
     ------
@@ -1032,7 +1096,7 @@ class TwoContexts:
     part: Part = "all"
 
     def __post_init__(self) -> None:
-        """Check the part."""
+        """Raise ValueError if ``part`` is unknown."""
         coordinates(self.first.task, self.hand, self.part)
 
     @property
@@ -1047,11 +1111,11 @@ class TwoContexts:
 
     @cached_property
     def configurations(self) -> tuple[Array, Array]:
-        """Configurations of the compared runs at the goal, for each context.
+        """Configurations of the compared runs at the goal, as an array for each context.
 
-        Each array has shape ``(runs, k)``, with the k coordinates of ``part``: all coordinates of
-        the robot in length units and rad, or those of :func:`coordinates`. A run is compared if it
-        hits ``goal`` with ``hand``.
+        Each array has shape ``(runs, k)``, in length units and rad. The k coordinates are those of
+        ``part``: all coordinates of the robot for ``"all"``, otherwise those of
+        :func:`coordinates`. The compared runs are those that hit ``goal`` with ``hand``.
         """
         goal, hand = self.goal - 1, HANDS.index(self.hand)
         first, second = (
@@ -1064,14 +1128,15 @@ class TwoContexts:
         return first[:, kept], second[:, kept]
 
     def of_part(self, part: Part) -> TwoContexts:
-        """Return the comparison of the same runs in another part of the posture."""
+        """Return a comparison of the same runs in another part of the posture (``part``)."""
         return replace(self, part=part)
 
     @property
     def in_both(self) -> bool:
-        """True if each context has a run that hits ``goal`` with ``hand``.
+        """True if each context has at least one run that hits ``goal`` with ``hand``.
 
-        If it is False, posture differences and p raise ValueError.
+        If it is False, :attr:`posture_difference` and the attributes computed from it raise
+        ValueError.
         """
         return all(map(len, self.configurations))
 
@@ -1082,7 +1147,7 @@ class TwoContexts:
 
     @property
     def can_test(self) -> bool:
-        """True if each context has the five compared runs that a test needs."""
+        """True if each context has at least the five compared runs that a test needs."""
         return min(map(len, self.configurations)) >= MIN_VALUES
 
     @property
@@ -1096,12 +1161,12 @@ class TwoContexts:
 
     @cached_property
     def difference(self) -> Estimate:
-        """The posture difference with its interval.
+        """The posture difference with its 95 % interval.
 
-        The ends of the interval are percentiles of a bootstrap that resamples runs within each
+        The interval is the percentile interval of a bootstrap that resamples runs within each
         context. There is no interval if a context has fewer than five runs, or if the method is
-        deterministic. Noise makes distances larger, so the interval of a small difference tends to
-        be too high.
+        deterministic. Noise makes distances larger, so that the interval of a small difference
+        tends to be too high.
         """
         value, n = self.posture_difference, tuple(map(len, self.configurations))
         if min(n) < MIN_RUNS or self.first.deterministic:
@@ -1115,11 +1180,12 @@ class TwoContexts:
     def lean(self) -> Lean:
         """Lean of the postures at the goal, in the coordinates of ``part``.
 
-        The lean (:func:`.lean`) says how much of the difference between the two contexts' next
-        postures is already there at the shared goal, compared with the start of the movement. The
-        coordinates are those of :func:`coordinates`: of all, only those that move the hand count.
-        In each context, only those compared runs count that hit the next goal with the hand that is
-        used most often for it.
+        The lean (:func:`.lean`) is the fraction of the difference between the next postures of the
+        two contexts that is already there at the shared goal. Its attribute ``more`` is this
+        fraction minus the same fraction at the start of the movement. The coordinates are those of
+        :func:`coordinates`; for ``"all"``, they are the coordinates that move the hand. In each
+        context, the next goal may be hit with either hand. Only the runs with the more frequent
+        hand count.
         """
         kept = coordinates(self.first.task, self.hand, self.part)
         goal, hand = self.goal - 1, HANDS.index(self.hand)
@@ -1136,18 +1202,20 @@ class TwoContexts:
 
     @property
     def standardised_posture_difference(self) -> float:
-        """Posture difference in pooled SDs within contexts.
+        """Posture difference in pooled standard deviations within contexts.
 
-        It is NaN if the postures do not differ within either context, or if each context has a
-        single run.
+        It is NaN if all runs of each context have the same posture, or if each context has a single
+        run (:func:`.standardised_posture_difference`).
         """
         return standardised_posture_difference(*self.configurations)
 
     @cached_property
     def parts(self) -> tuple[float, float]:
-        """Motor-equivalent part of the posture difference of all coordinates, and the other part.
+        """Motor-equivalent part of the posture difference in all coordinates, and the other part.
 
-        The first part does not move the hand. Both are per dimension (:func:`motor_equivalence`).
+        The motor-equivalent part does not move the hand, to first order. Both parts are per
+        dimension, in length units and rad (:func:`motor_equivalence`). The Jacobian is that of the
+        mean posture of all compared runs.
         """
         task, joints = self.first.task, movable(self.first.task, self.hand)
         postures = self.of_part("all").configurations
@@ -1158,10 +1226,10 @@ class TwoContexts:
 
     @cached_property
     def p(self) -> float:
-        """p of the permutation test that the posture difference exceeds chance.
+        """p-value of the permutation test of the posture difference (:func:`.permutation_p`).
 
-        The test is one-tailed (:func:`.permutation_p`). p is NaN if a context has fewer than five
-        runs.
+        The null hypothesis is that the context has no effect on the posture. The p-value is NaN if
+        a context has fewer than five compared runs.
         """
         if not self.can_test:
             return math.nan
@@ -1169,9 +1237,10 @@ class TwoContexts:
 
     @cached_property
     def p_same(self) -> float:
-        """p of the bootstrap test that the posture difference is below :data:`SAME`.
+        """p-value of the bootstrap test that the posture difference is below :data:`SAME`.
 
-        See :func:`.posture_difference_below`. p is NaN if a context has fewer than five runs.
+        The test is :func:`.posture_difference_below`. The p-value is NaN if a context has fewer
+        than five compared runs.
         """
         if not self.can_test:
             return math.nan
@@ -1179,11 +1248,23 @@ class TwoContexts:
         return posture_difference_below(*self.configurations, SAME, rng, standardised=False)
 
     def p_beyond(self, other: TwoContexts) -> float:
-        """Return p of the permutation test that the posture difference exceeds that of ``other``.
+        """Test whether the posture difference exceeds that of another method (:func:`.beyond_p`).
 
-        ``other`` has the runs of another method at the same goal, compared in the same part. p is
-        twice the upper tail (:func:`.beyond_p`), and NaN if a context has fewer than five runs.
-        Raises ValueError if the parts differ.
+        Parameters
+        ----------
+        other : TwoContexts
+            Runs of another method at the same goal, compared in the same part of the posture.
+
+        Returns
+        -------
+        float
+            Twice the upper-tail p-value of the permutation test, but at most 1. It is NaN if a
+            context of one of the methods has fewer than five compared runs.
+
+        Raises
+        ------
+        ValueError
+            ``part`` of the two comparisons differs.
         """
         if self.part != other.part:
             raise ValueError(
@@ -1195,10 +1276,10 @@ class TwoContexts:
         return beyond_p(self.configurations, other.configurations, self._rng("beyond"))
 
     def _rng(self, test: str) -> np.random.Generator:
-        """Return a new random generator for a test.
+        """Return a new random generator for the test with this name.
 
-        The seed depends on the test, the goal, the hand and the second task, but not on the folder
-        or the method.
+        The seed depends on the test, the goal, the hand and the second task. It does not depend on
+        the folder or the method.
         """
         where = f"goal {self.goal}, {self.hand} hand, against {self.second.task.name}"
         return np.random.default_rng([SEED, zlib.crc32(f"{test} {where}".encode())])

@@ -1,7 +1,8 @@
-"""Rank the methods of a study, and say why some are not ranked.
+"""Rank the methods of a study, and say why some methods are not ranked.
 
-A method is ranked if it solved all tasks that were asked for, with the same number of trials as the
-other methods (:func:`ranking_budget`). Searches for the optimum are references and are not ranked.
+A method is ranked if all its runs on all tasks of the ranking are solved, and if it was asked for
+the same number of trials as the other methods (:func:`ranking_budget`). Searches for the optimum
+are references and are not ranked.
 """
 
 from __future__ import annotations
@@ -21,15 +22,17 @@ from coartic.runs.record import NOISE_RULE
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
-    """Return a name for the best known rewards of tasks, such as ``optimum``.
+    """Return what the best known rewards of tasks are called in sentences, such as ``optimum``.
+
+    A reward counts as *local* if it is not proven to be the optimum, and is known only from methods
+    of this folder. The name is
 
     - ``optimum`` if all rewards are proven, or if there are no tasks;
-    - ``best known reward`` if some are not proven;
-    - ``best of this folder`` if none is proven, and all are known only from methods of this folder.
+    - ``best known reward`` if at least one reward is not proven, and none is local;
+    - ``best of this folder`` if all rewards are local.
 
-    If only some rewards are not proven and known only from this folder, ``or best of this folder``
-    is added to the name for the other rewards. Raises KeyError for a task without a best known
-    reward.
+    If some rewards are local and others are not, the name is the one of the others, followed by
+    ``or best of this folder``. Raises KeyError for a task without a best known reward.
     """
     best = [study.optima[task] for task in tasks]
     others = [known.proven for known in best if known.proven or not known.only_here]
@@ -41,21 +44,20 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 
 
 NOT_HERE = "no runs in this world"
-"""Why a method is not ranked that has runs only in other worlds of the folder."""
+"""Reason why a method is not ranked: it has runs only in other worlds of the folder."""
 ESTIMATES, COUNTS = ("gap", "share", "noisy_gap"), ("tasks", "runs", "failed")
-"""Columns of numbers of :func:`.ranking`."""
+"""Columns of :func:`.ranking` that are estimates with an interval, and columns that are counts."""
 _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "parameters", "information"]
-"""Columns of runs that no ranking uses. Dropping them saves memory for a large folder."""
+"""Columns of runs that no ranking uses. They are dropped to save memory for a large folder."""
 
 
 @lru_cache(maxsize=4)
 def compared_runs(study: Study) -> pd.DataFrame:
     """Return the runs that the ranking uses, including failed runs.
 
-    The study must have one world (:attr:`.Study.worlds`).
-
-    These are the runs of all methods except searches for the optimum, on tasks with a best known
-    reward. The columns :data:`_OF_RECORD` are left out. The frame is cached: do not change it.
+    These are the runs, on all tasks with a best known reward, of all methods except searches for
+    the optimum. The columns :data:`_OF_RECORD` are left out. The frame is cached: do not change it.
+    Raises CoarticError for a study of several worlds (:attr:`.Study.worlds`).
     """
     check_study(study)
     runs = study.runs[study.runs.best_known.notna()].drop(columns=_OF_RECORD, errors="ignore")
@@ -65,9 +67,10 @@ def compared_runs(study: Study) -> pd.DataFrame:
 
 @lru_cache(maxsize=4)
 def runs_by_method(study: Study) -> dict[str, pd.DataFrame]:
-    """Return :func:`compared_runs` by their row in the ranking (column ``ranked_as``).
+    """Return a dict that maps each row of the ranking to its runs.
 
-    Rows are in the order of :attr:`.Study.methods`.
+    The keys are the names in column ``ranked_as`` of :func:`compared_runs`, in the order of
+    :attr:`.Study.methods`. The dict is cached: do not change it.
     """
     by_method = dict([*compared_runs(study).groupby("ranked_as", sort=False)])
     return {label: by_method[label] for label in study.methods.index if label in by_method}
@@ -76,8 +79,8 @@ def runs_by_method(study: Study) -> dict[str, pd.DataFrame]:
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
     """Return the runs of a method on tasks, including failed runs.
 
-    ``method`` is its label, or the label of a row of the ranking. The frame is empty if the method
-    has no run on one of the tasks.
+    ``method`` is the label of the method, or the label of a row of the ranking. The frame is empty
+    if at least one of the tasks has no run of the method.
     """
     runs, tasks = compared_runs(study), {*tasks}
     runs = runs[runs.task.isin(tasks) & ((runs.ranked_as == method) | (runs.label == method))]
@@ -85,15 +88,19 @@ def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
 
 
 def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return the pairs of task and method (label) that occur in runs, in order."""
+    """Return the distinct pairs of task and label of a method in ``runs``.
+
+    The pairs are in the order in which they first appear.
+    """
     return [*dict.fromkeys(zip(runs.task, runs.label, strict=True))]
 
 
 @lru_cache(maxsize=4)
 def ranked_tasks(study: Study) -> tuple[str, ...]:
-    """Return the tasks on which methods are ranked, in the order of the study.
+    """Return the names of the tasks on which methods are ranked.
 
-    These are all tasks that have a best known reward and on which runs were asked for.
+    The names are in the order of the study. These are all tasks that have a best known reward, and
+    on which a method other than a search for the optimum was run.
     """
     tasks = {*compared_runs(study).task}
     return tuple(task for task in study.tasks if task in tasks)
@@ -101,15 +108,16 @@ def ranked_tasks(study: Study) -> tuple[str, ...]:
 
 @lru_cache(maxsize=4)
 def ranking_budget(study: Study) -> int | None:
-    """Return the number of trials with which methods are ranked (column ``budget``).
+    """Return the number of trials that ranked methods were asked for, or None.
 
-    It is
+    The numbers of trials of a method are those in column ``budget`` of its runs. The result is
 
-    - None, if no method has trials, or a method has several numbers, because the study then
-      compares these numbers;
-    - otherwise the number that the last command, or else the suite's file, asked for, if a method
-      has it;
-    - otherwise the number that most algorithms have; the smallest of them if there is a tie.
+    - None if no method has trials, or if a method has runs with different numbers of trials: the
+      study then compares these numbers;
+    - otherwise the number that the last command (or, if it named none, the suite's file) asked for,
+      if a method has this number;
+    - otherwise the number that the most algorithms have, and the smallest of these if there is a
+      tie.
     """
     runs = compared_runs(study).dropna(subset="budget")
     if runs[["method", "budget"]].drop_duplicates().duplicated("method").any():
@@ -123,25 +131,27 @@ def ranking_budget(study: Study) -> int | None:
 
 @lru_cache(maxsize=4)
 def standings(study: Study) -> pd.DataFrame:
-    """Rank the methods of a study by their gap.
+    """Rank the methods of a study by their mean gap.
 
-    A method is ranked if it solved all of :func:`ranked_tasks` with :func:`ranking_budget` trials.
-    Ranked methods come first, the smallest gap first. The others follow. A method that solved all
-    tasks with another number of trials has a gap, but is not ranked.
+    A method is ranked if it solved all runs on all tasks of :func:`ranked_tasks`, and was asked for
+    the number of trials of :func:`ranking_budget`. A method that solved all runs with another
+    number of trials has a gap, but is not ranked.
 
     Returns
     -------
     DataFrame
-        A row for each method of :func:`runs_by_method`, by label. It has the columns of
-        :func:`.ranking` and of :attr:`.Study.methods`; ``why`` says why a method is not ranked, and
-        is empty for ranked methods. Column ``note`` says
+        A row for each method of :func:`runs_by_method`, indexed by label. Ranked methods come
+        first, in ascending order of their gaps; methods that are not ranked follow. The frame has
+        the columns of :func:`.ranking` and of :attr:`.Study.methods`. Column ``why`` is the reason
+        why a method is not ranked; it is empty for a ranked method. Column ``note`` says
 
-        - how many trials the solved runs of a method from a file made, if a run was asked for
-          another number;
+        - how many trials the solved runs of a method from a file made, if a run made another number
+          of trials than was asked for;
         - how many of a method's solutions, found in the paper's world, can fail with motor noise;
         - in a world with noise, how many executions failed.
 
-        Methods that have runs only in other worlds (:attr:`.Study.elsewhere`) have a row, too.
+        Methods that have runs only in other worlds (:attr:`.Study.elsewhere`) have a row, too, with
+        the reason :data:`NOT_HERE`.
     """
     runs, budget = compared_runs(study), ranking_budget(study)
     elsewhere = study.elsewhere
@@ -185,9 +195,10 @@ def standings(study: Study) -> pd.DataFrame:
 
 
 def has_few_runs(study: Study, methods: Iterable[str], tasks: Iterable[str]) -> bool:
-    """Return True if a stochastic one of these methods has too few runs on a task for a test.
+    """Return True if a stochastic method has too few runs for a test.
 
-    ``methods`` are labels, or labels of rows of the ranking.
+    ``methods`` are labels of methods, or labels of rows of the ranking. Deterministic methods among
+    them are not checked, because one run of them is exact.
     """
     stochastic = study.methods.stochastic.astype(bool)
     drawn = [runs_on(study, method, tasks) for method in methods]
@@ -197,9 +208,9 @@ def has_few_runs(study: Study, methods: Iterable[str], tasks: Iterable[str]) -> 
 
 @lru_cache(maxsize=1_024)
 def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
-    """Return the names of the tasks that a method solved in all runs.
+    """Return the names of the tasks on which all runs of a method are solved.
 
-    ``method`` is its label, or the label of a row of the ranking.
+    ``method`` is the label of the method, or the label of a row of the ranking.
     """
     runs = compared_runs(study)
     runs = runs[(runs.ranked_as == method) | (runs.label == method)]

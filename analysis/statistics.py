@@ -1,26 +1,28 @@
-"""Tests of hypotheses on runs, and means over tasks with their intervals.
+"""Test hypotheses about runs, and compute means over tasks with their intervals.
 
 Tests:
 
-- Two means are compared by exchanging the labels of their values (:func:`exchange_test`).
-- A mean is compared with a number by the bootstrap (:func:`bootstrap_test`).
-- A share is compared with a number by the exact binomial test (:func:`share_test`).
+- :func:`exchange_test` compares two means by a permutation test, which exchanges the labels of the
+  values.
+- :func:`bootstrap_test` compares a mean with a number by the studentised bootstrap (bootstrap-t).
+- :func:`share_test` compares a share with a number by the exact binomial test.
+- :func:`holm` adjusts the p-values of several tests.
 
-Samples and seeds are as in :mod:`coartic.estimates`. Sources: B. Efron & R. J. Tibshirani (1993),
-An Introduction to the Bootstrap, chapter 16; A. C. Davison & D. V. Hinkley (1997), Bootstrap
-Methods and their Application, chapter 4 (p-values that count the observed sample); S. Holm (1979),
-Scandinavian Journal of Statistics 6.
+Samples and the seed of resampling are those of :mod:`coartic.estimates`. Sources: B. Efron & R. J.
+Tibshirani (1993), An Introduction to the Bootstrap, chapter 16; A. C. Davison & D. V. Hinkley
+(1997), Bootstrap Methods and their Application, chapter 4 (p-values that count the observed
+sample); S. Holm (1979), Scandinavian Journal of Statistics 6.
 
 Intervals:
 
-- For other runs on the same tasks (:func:`task_mean`), the bootstrap resamples runs within tasks.
-  All tasks have the same weight, whatever their number of runs.
-- For other tasks (:func:`other_tasks`), the sample has runs within instances within families. The
-  bootstrap is hierarchical (Davison & Hinkley 1997, section 3.8): it resamples instances within
-  families, then runs within instances. Families are fixed and have the same weight.
+- The interval of :func:`task_mean` is for other runs on the same tasks. The bootstrap resamples
+  runs within tasks. All tasks have the same weight, whatever their number of runs.
+- The interval of :func:`other_tasks` is for other tasks of the same families. The bootstrap is
+  hierarchical (Davison & Hinkley 1997, section 3.8): it resamples instances within families, and
+  then runs within instances. Families are fixed and have the same weight.
 
-A mixed model does not fit: gaps to an optimum are skewed and bounded by 0, and their spread over
-runs differs between methods and tasks.
+A mixed-effects model is not used, because its assumptions do not hold: gaps to an optimum are
+skewed and bounded by 0, and their spread over runs differs between methods and tasks.
 """
 
 from __future__ import annotations
@@ -53,7 +55,7 @@ from coartic.estimates import (
     vector,
 )
 from coartic.internal.arguments import Numbers
-from coartic.internal.limits import MAX_RUNS
+from coartic.internal.limits import MAX_RUNS, brief_value
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
@@ -69,37 +71,48 @@ def bootstrap_test(
     *,
     resamples: Resamples = RESAMPLES,
 ) -> Estimate:
-    """Test the difference of a mean and a number by the bootstrap.
+    """Test whether a mean differs from a number, by the studentised bootstrap (bootstrap-t).
 
-    The sample is shifted to the mean 0 and resampled; the statistic is the mean divided by its
-    standard error (Efron & Tibshirani 1993, section 16.4). Unlike in the book, p = (1 + resamples
-    at least as extreme) / (1 + resamples), which is never 0 (Davison & Hinkley 1997).
+    The test statistic is the mean divided by its standard error, after ``bound`` is subtracted from
+    each value. For its distribution under the null hypothesis, the sample is shifted to the mean 0
+    and resampled (Efron & Tibshirani 1993, section 16.4). Unlike in the book, p = (1 + number of
+    bootstrap samples at least as extreme) / (1 + number of bootstrap samples), which is never 0
+    (Davison & Hinkley 1997).
 
     Parameters
     ----------
     values : array_like, shape (n,)
+        The sample: independent values.
     bound : float
-        The number with which the mean is compared.
+        The number with which the mean is compared, in the unit of ``values``.
     alternative : {"greater", "less", "two-sided"}
-        ``"greater"``: the mean of ``values`` is above ``bound``.
+        The alternative hypothesis: the mean of ``values`` is above ``bound`` (``"greater"``), below
+        it (``"less"``), or one of the two (``"two-sided"``).
     resamples : int
         Number of bootstrap samples; by default 9,999, so that the smallest p is 0.0001.
 
     Returns
     -------
     Estimate
-        ``value`` is the mean less ``bound``; there is no interval.
+        ``value`` is the mean minus ``bound``; there is no interval.
 
-        - ``least_p`` is the smallest p of the sign test of n values, or of this number of
-          resamples, whichever is larger. With few values p can be smaller than ``least_p``.
-        - If all values are equal, p is ``least_p``, or 1 if the difference has the other sign than
-          a one-tailed alternative.
-        - p is NaN with fewer than two values, and if all values are equal to ``bound``.
+        - ``least_p`` is the larger of two numbers: the smallest p that the sign test of n values
+          can give, and 1 / (1 + ``resamples``). With few values, ``p`` can be smaller than
+          ``least_p``.
+        - If all values are equal, ``p`` is ``least_p``, or 1 if the difference does not have the
+          sign of a one-sided alternative.
+        - ``p`` is NaN with fewer than two values, and if all values are equal to ``bound``.
 
     Raises
     ------
     ValueError
-        The sample is empty, or a number is NaN or infinite.
+        ``values`` is empty or not a vector, or a number is NaN or infinite.
+
+    Examples
+    --------
+    >>> test = bootstrap_test([0.9, 1.2, 1.1, 0.8, 1.0], 0.0)
+    >>> round(test.value, 3), test.p < 0.05
+    (1.0, True)
     """
     sample = vector(values) - vector([bound])[0]
     difference, n = float(sample.mean()), len(sample)
@@ -124,33 +137,42 @@ def exchange_test(
     *,
     resamples: Resamples = RESAMPLES,
 ) -> Estimate:
-    """Test the difference of two means by exchanging the labels of the values.
+    """Test whether two means differ, by a permutation test that exchanges the labels of values.
 
-    The statistic is the difference of means divided by its standard error. Each sample has its own
-    variance, so the test also holds asymptotically for samples of unequal spread (A. Janssen 1997,
-    Statistics & Probability Letters 36). If both variances are 0, the statistic is infinite, or 0
-    if the means are equal.
+    The test statistic is the difference of the means divided by its standard error. The standard
+    error has a separate variance for each sample, so that the test is also valid, for large
+    samples, if their spreads differ (A. Janssen 1997, Statistics & Probability Letters 36). If both
+    variances are 0, the statistic is infinite, or 0 if the means are equal.
 
     Parameters
     ----------
     first, second : array_like, shapes (n,) and (m,)
+        The two samples: independent values, in the same unit.
     alternative : {"greater", "less", "two-sided"}
-        ``"greater"``: the mean of ``first`` is higher. ``"two-sided"`` compares absolute values of
-        the statistic.
+        The alternative hypothesis: the mean of ``first`` is above that of ``second``
+        (``"greater"``), below it (``"less"``), or one of the two (``"two-sided"``). The two-sided
+        test compares absolute values of the statistic.
     resamples : int
-        Number of random exchanges. If there are at most this many different exchanges, all are
-        made, and p is exact. Otherwise p = (1 + exchanges at least as extreme) / (1 + resamples).
+        Number of random permutations. If there are at most this many ways to divide the values, all
+        of them are used, and p is exact. Otherwise p = (1 + number of permutations at least as
+        extreme) / (1 + ``resamples``).
 
     Returns
     -------
     Estimate
-        ``value`` is the mean of ``first`` less the mean of ``second``; there is no interval. p is
-        NaN with fewer than five values in a sample, and if all values are equal.
+        ``value`` is the mean of ``first`` minus the mean of ``second``; there is no interval. ``p``
+        is NaN with fewer than five values in a sample, and if all values are equal. ``least_p`` is
+        the smallest p that the test can give (:func:`smallest_p`).
 
     Raises
     ------
     ValueError
-        A sample is empty, or a value is NaN or infinite.
+        A sample is empty or not a vector, or a value is NaN or infinite.
+
+    Examples
+    --------
+    >>> exchange_test([5, 6, 7, 8, 9], [0, 1, 2, 3, 4]).p  # one of 252 ways
+    0.003968253968253968
     """
     samples = vector(first), vector(second)
     n, m = map(len, samples)
@@ -164,19 +186,29 @@ def exchange_test(
 
 
 def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool = True) -> float:
-    """Return the smallest p that a permutation test of two samples can give.
+    """Return the smallest p that the permutation test of two samples can give.
 
     The test is :func:`exchange_test`.
 
     Parameters
     ----------
     n, m : int
-        Numbers of values or runs in the two samples, at least 2.
+        Numbers of values in the two samples, at least 2.
     resamples : int
-        Number of random exchanges.
+        Number of random permutations, which are used if there are more ways to divide the values.
     two_tailed : bool
-        True for a two-tailed test. Swapping samples of equal size then gives an equally extreme
-        statistic, so the smallest exact p is doubled.
+        True for the two-sided test. If both samples have the same size, swapping them gives a
+        statistic that is as extreme, so that the smallest exact p is twice as large.
+
+    Returns
+    -------
+    float
+        The smallest p.
+
+    Examples
+    --------
+    >>> smallest_p(5, 5, two_tailed=False)  # 1 / 252
+    0.003968253968253968
     """
     ways = math.comb(n + m, n)
     if ways > resamples:  # exchanges are random, and perhaps none is as extreme as the samples
@@ -185,18 +217,18 @@ def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool =
 
 
 def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> float:
-    """Return the two-sided p-value of a difference of means, averaged over strata such as tasks.
+    """Return the two-sided p-value of a difference of means, summed over strata such as tasks.
 
-    In each stratum, labels are exchanged as in :func:`exchange_test`. A sample that is compared
-    with an exact number is resampled as in :func:`bootstrap_test`. The statistic is the sum of the
-    differences divided by the root of the sum of their variances. p = (1 + resamples at least as
-    extreme) / (1 + resamples).
+    In each stratum, labels are exchanged as in :func:`exchange_test`. If a stratum compares a
+    sample with an exact number, the sample is resampled as in :func:`bootstrap_test`. The test
+    statistic is the sum of the differences over strata, divided by the square root of the sum of
+    their variances. p = (1 + number of resamples at least as extreme) / (1 + number of resamples).
 
     Parameters
     ----------
     strata : sequence of pairs
-        For each stratum, two samples, shapes (n,) and (m,). A float instead of a sample is an exact
-        number.
+        Two samples for each stratum, shapes (n,) and (m,). A float instead of a sample stands for
+        an exact number, such as the gap of a deterministic method.
 
     Returns
     -------
@@ -222,10 +254,10 @@ def _p_of(
     *,
     exact: bool = False,
 ) -> float:
-    """Return the p-value of :func:`stratified_test` for an alternative.
+    """Return the p-value of :func:`stratified_test` for a one-sided or two-sided alternative.
 
-    With ``exact``, all exchanges of labels are made instead of ``resamples`` random ones. There
-    must then be one stratum with two samples.
+    If ``exact`` is True, all ways to exchange labels are used instead of ``resamples`` random ones.
+    There must then be only one stratum, and it must have two samples.
     """
     if exact:
         resamples = math.comb(sum(map(np.size, strata[0])), np.size(strata[0][0]))
@@ -259,24 +291,24 @@ def _p_of(
 
 
 def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
-    """Return the difference of means and its variance for each choice of a sample's values.
+    """Return the difference of means and its variance for each resample of two samples.
 
     Parameters
     ----------
-    pool : ndarray
-        The values of both samples, or of the only sample.
+    pool : ndarray, shape (N,)
+        The values of both samples together, or of the only sample.
     rows : ndarray of int, shape (rows, k)
-        For each choice, the indices in ``pool`` of one sample: of the first sample if k = n,
-        otherwise of the second. If k is the length of ``pool``, a row draws from the only sample
-        with replacement.
+        The resamples: each row has the indices in ``pool`` of the values of one sample. This is the
+        first sample if k = n, otherwise the second. If k = N, there is only one sample, and each
+        row draws from it with replacement.
     n : int
         Number of values of the first sample.
 
     Returns
     -------
     (ndarray, ndarray), shapes (rows,)
-        Mean of the first sample less that of the second, and the variance of this difference. For
-        only one sample, its mean and the variance of the mean.
+        The mean of the first sample minus the mean of the second, and the variance of this
+        difference. If there is only one sample: its mean, and the variance of the mean.
     """
     few, many = rows.shape[1], len(pool) - rows.shape[1]
     values = pool[rows]
@@ -297,11 +329,12 @@ def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
 
 
 def _studentised(moments: Array, size: float) -> Array:
-    """Return differences divided by the square roots of their variances.
+    """Return differences divided by the square roots of their variances, shape ``(rows,)``.
 
-    ``moments`` has the differences in its first row and the variances in its second. ``size`` is
-    the size of the values: differences and variances that can be their rounding count as 0. The
-    result is 0 if the difference is 0, and otherwise infinite if the variance is 0.
+    ``moments``, shape ``(2, rows)``, has the differences in its first row and the variances in its
+    second. ``size`` is a bound on the absolute values of the sample. Differences and variances that
+    are so small, relative to it, that they can be due to rounding count as 0. The result is 0 if
+    the difference is 0, and infinite if only the variance is 0.
     """
     differences = np.where(np.abs(moments[0]) < NEGLIGIBLE * size, 0.0, moments[0])
     variances = np.where(moments[1] < (NEGLIGIBLE * size) ** 2, 0.0, moments[1])
@@ -310,10 +343,11 @@ def _studentised(moments: Array, size: float) -> Array:
 
 
 def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
-    """Count the statistics in ``null``, shape ``(n,)``, that are at least as extreme as observed.
+    """Count the statistics of resamples that are at least as extreme as the observed statistic.
 
-    Extreme is high for ``"greater"``, low for ``"less"``, and far from 0 for ``"two-sided"``.
-    Statistics that are equal up to rounding count.
+    ``null`` has the statistics of the resamples, shape ``(n,)``. A statistic is extreme if it is
+    high (alternative ``"greater"``), low (``"less"``), or far from 0 (``"two-sided"``). A statistic
+    that equals the observed one, up to rounding, counts.
     """
     if alternative == "two-sided":
         null, observed = np.abs(null), abs(observed)
@@ -322,9 +356,10 @@ def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
 
 
 def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.int32]:
-    """Draw ``chosen`` of the indices 0 to ``runs`` - 1 without replacement, ``size`` times.
+    """Draw random subsets of the indices 0 to ``runs`` - 1.
 
-    The result has shape ``(size, chosen)``.
+    Each of the ``size`` rows has ``chosen`` indices, drawn without replacement. The result has
+    shape ``(size, chosen)``.
     """
     order = rng.random((size, runs)).argpartition(chosen - 1, axis=1)
     return order[:, :chosen].astype(np.int32)  # a view would hold all of order in memory
@@ -333,13 +368,16 @@ def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> N
 def places(
     runs: int, chosen: int, resamples: int, exact: bool, rng: np.random.Generator
 ) -> Iterator[tuple[slice, NDArray[np.int32]]]:
-    """Yield resamples in chunks: a slice of the resamples, and their rows of indices.
+    """Yield the indices of resamples in chunks that fit into the processor's cache.
 
-    A row has ``chosen`` of the indices 0 to ``runs`` - 1:
+    Each chunk is a pair: the slice of the resamples that it contains, and an array of shape
+    ``(resamples in the chunk, chosen)``. Each row of the array is a resample. It has ``chosen`` of
+    the indices 0 to ``runs`` - 1:
 
-    - with ``exact``, rows are all choices, one after the other; ``resamples`` must be their number;
-    - otherwise they are random, with replacement if ``chosen`` equals ``runs``, and without if it
-      is smaller.
+    - If ``exact`` is True, the rows are all combinations of ``chosen`` indices, and ``resamples``
+      must be the number of combinations.
+    - Otherwise the indices are drawn at random: with replacement if ``chosen`` equals ``runs``, and
+      without replacement if it is smaller.
     """
     choices = combinations(range(runs), chosen)
     for part in slices(resamples, max(1, IN_CACHE // runs)):
@@ -356,51 +394,82 @@ def places(
 def _kept_places(
     runs: int, chosen: int, resamples: int, exact: bool
 ) -> list[tuple[slice, NDArray[np.int32]]]:
-    """Return the pairs of :func:`places` for a new generator as a list.
+    """Return the chunks of :func:`places` as a list, drawn by a new generator with :data:`.SEED`.
 
-    The list is cached for other samples of this size: do not change it.
+    The list is cached for other samples of the same size: do not change it.
     """
     return [*places(runs, chosen, resamples, exact, np.random.default_rng(SEED))]
 
 
 def share_test(count: _Count, total: _Count, share: _Share, alternative: Alternative) -> Estimate:
-    """Test ``count`` of ``total`` runs against a share (0 to 1) by the exact binomial test.
+    """Test whether a proportion of runs differs from a share, by the exact binomial test.
 
-    The value of the estimate is the difference ``count / total - share``. Raises ValueError if
-    ``count`` exceeds ``total``, or ``total`` is 0.
+    Parameters
+    ----------
+    count : int
+        Number of runs with the property of interest.
+    total : int
+        Number of all runs.
+    share : float
+        The share with which ``count / total`` is compared, from 0 to 1.
+    alternative : {"greater", "less", "two-sided"}
+        The alternative hypothesis: the proportion is above ``share``, below it, or one of the two.
+
+    Returns
+    -------
+    Estimate
+        ``value`` is ``count / total - share``; there is no interval.
+
+    Raises
+    ------
+    ValueError
+        ``count`` exceeds ``total``, or ``total`` is 0.
+
+    Examples
+    --------
+    >>> round(share_test(9, 10, 0.5, "greater").p, 4)
+    0.0107
     """
     p = float(scipy.stats.binomtest(count, total, share, alternative).pvalue)
     return Estimate(count / total - share, p=p, n=(total,))
 
 
 def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
-    """Return the p-values of a family of tests, adjusted by Holm (1979), in the same order.
+    """Return the Holm-adjusted p-values of a family of tests, in the order of the tests.
 
-    If you reject at adjusted p-values up to α, the family-wise error rate is at most α, also for
-    dependent tests.
+    If each hypothesis with an adjusted p-value of at most α is rejected, the family-wise error rate
+    is at most α. The tests may depend on each other.
 
     Parameters
     ----------
     p_values : array_like
-        p-values from 0 to 1. NaN stands for a missing test and stays NaN.
+        A p-value from 0 to 1 for each test, or NaN for a test that could not be made.
     family : int, optional
-        Number of planned tests. Missing tests then count as p = 1; by default they do not count.
+        Number of planned tests. Tests without a p-value then count as tests with p = 1. By default,
+        tests without a p-value do not count.
 
     Returns
     -------
     list of float
+        The adjusted p-value of each test; NaN for a test without a p-value.
 
     Raises
     ------
     ValueError
-        A number is not a p-value, or there are more tests than ``family``.
+        A number is neither NaN nor from 0 to 1, or there are more p-values than ``family``.
+
+    Examples
+    --------
+    >>> holm([0.01, 0.04, 0.03])
+    [0.03, 0.06, 0.06]
     """
     p = np.reshape(p_values, -1)
     tests = int((~np.isnan(p)).sum())
     planned = tests if family is None else family
     if tests > planned or not ((p >= 0) & (p <= 1) | np.isnan(p)).all():
         raise ValueError(
-            f"p_values must be p-values from 0 to 1, or NaN, of at most {planned} tests"
+            f"p_values is {brief_value(p.tolist())}; it must have p-values from 0 to 1, or NaN, of "
+            f"at most {planned} tests"
         )
     order = np.argsort(p, kind="stable")  # NaN last
     steps = np.maximum.accumulate(p[order] * (planned - np.arange(len(p))))
@@ -410,14 +479,29 @@ def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
 
 
 Scores = Mapping[str, Sequence[Numbers]]
-"""For each family, the scores of the runs on each instance, shape ``(n,)``."""
+"""A dict that maps each family to a list with an array for each instance: the scores of the runs on
+this instance, shape ``(runs,)``."""
 
 
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
-    """Return the mean over tasks of the mean over runs, with its interval for other runs.
+    """Return the mean over tasks and runs, with its interval for other runs.
 
-    ``values`` has the runs of each task, shape ``(runs,)``. The interval is that of
-    :func:`.mean_of_means`. Raises ValueError if there are no tasks, or a task has no runs.
+    All tasks have the same weight: the mean over tasks is of the means over runs.
+
+    Parameters
+    ----------
+    values : iterable of array_like, shape (runs,)
+        A score of each run on each task.
+
+    Returns
+    -------
+    Estimate
+        The mean and the ends of its interval (:func:`.mean_of_means`), in the unit of the scores.
+
+    Raises
+    ------
+    ValueError
+        There are no tasks, a task has no runs, or a score is NaN or infinite.
     """
     strata = [*map(vector, values)]
     return mean_of_means(strata, [1 / len(strata) for _ in strata])
@@ -429,13 +513,16 @@ def other_tasks(scores: Scores) -> Estimate:
     Parameters
     ----------
     scores : mapping of str to sequence of arrays, shape (runs,)
-        For each family, the scores of the runs on each instance.
+        Maps each family to a list of its instances (random tasks). Each instance has an array with
+        a score of each run.
 
     Returns
     -------
     Estimate
-        ``value``, ``low`` and ``high`` in the unit of the scores; ``n`` is the number of instances
-        of each family. There is no interval (NaN) if a family has fewer than three instances.
+        ``value`` is the mean over families of the mean over instances of the mean over runs. Its
+        95 % interval, ``low`` to ``high``, is for other tasks of the same families. All are in the
+        unit of the scores. ``n`` has the number of instances of each family. The ends of the
+        interval are NaN if a family has fewer than three instances.
 
     Raises
     ------
@@ -451,14 +538,19 @@ def other_tasks(scores: Scores) -> Estimate:
 
     Notes
     -----
-    The ends of the interval are percentiles of bootstrap samples. For the k instances of a family,
-    deviations are multiplied by √(k / (k − 1)), because the bootstrap underestimates the spread of
-    a mean by this factor. The interval is a little too wide for few runs with much noise, because
-    the means of instances already contain this noise. Its ends are limited by the lowest and by the
-    highest score of a run, each as a mean over families.
+    The interval is a percentile interval of bootstrap samples. In a family with k instances, the
+    deviations of bootstrap means from the mean are multiplied by √(k / (k − 1)), because the
+    bootstrap underestimates the standard deviation of a mean by this factor. If there are few runs
+    that vary much, the interval is a little too wide, because the means of instances already
+    contain the variation over runs. The interval never extends beyond the lowest and the highest
+    score of a run, each averaged over families.
     """
     if not scores or not all(scores.values()):
-        raise ValueError("scores must have at least one family, and one instance of each family")
+        sizes = {family: len(instances) for family, instances in scores.items()}
+        raise ValueError(
+            f"scores has the families {sizes} with these numbers of instances; it must have at "
+            "least one family, and at least one instance of each family"
+        )
     samples = {family: [*map(vector, instances)] for family, instances in scores.items()}
     values = {
         family: np.array([runs.mean() for runs in instances])

@@ -1,7 +1,7 @@
 """Load a results folder as a study: its runs, methods, cells, tasks, movements and optima.
 
-``load("results/comparison")`` reads a folder. The other modules of the analysis have functions that
-take the study.
+``load("results/comparison")`` reads a folder and returns a :class:`Study`. The functions of the
+other modules of the analysis take this study as their argument.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
 
 CellKey = tuple[str, str]
-"""Name of a task, and label of a method: its id and setting, as in ``cma-es/bandit sigma=0.1``."""
+"""Name of a task, and label of a method: its id with its setting, such as ``cma-es/bandit
+sigma=0.1``."""
 
 
 UNITS = {
@@ -62,17 +63,21 @@ UNITS = {
     "other_arm_travel": "rad",
     "process_peak_mb": "MiB",
 }
-"""Units of columns of :attr:`Study.runs`. They are also in its ``attrs["units"]``."""
+"""Maps columns of :attr:`Study.runs` to their units. The frame also has this dict in
+``attrs["units"]``."""
 
 
 def _labelled(stored: pd.DataFrame) -> pd.DataFrame:
-    """Return stored runs with their ``label`` and ``ranked_as`` (:attr:`Study.runs`)."""
+    """Return stored runs with the columns ``label`` and ``ranked_as`` of :attr:`Study.runs`."""
     runs = stored.assign(label=[*map(label_of, stored.method, stored.setting)])
     return runs.assign(ranked_as=ranked_as(runs))
 
 
 def solved(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs with a solution (status ``ok``), or the frame itself if all have one."""
+    """Return the runs that have a solution (status ``ok``).
+
+    If all runs have one, the frame itself is returned.
+    """
     is_solved = runs.status.to_numpy() == "ok"
     return runs if is_solved.all() else runs[is_solved]
 
@@ -80,27 +85,27 @@ def solved(runs: pd.DataFrame) -> pd.DataFrame:
 def typical_run(runs: pd.DataFrame) -> str:
     """Return the id of the run whose value is nearest to the median.
 
-    If there is a tie, it is the first of these runs. All runs must have a solution (status ``ok``).
+    If several runs are equally near, it is the first of them. All runs must have a solution (status
+    ``ok``), and there must be at least one run.
     """
     values = runs.value.to_numpy(dtype=np.float64)
     return str(runs.run_id.iloc[np.abs(values - np.median(values)).argmin()])
 
 
 Part = Literal["solution", "replay"]
-"""Part of a run that can be executed."""
+"""Part of a run whose movements can be executed: its solution, or its replay (the trial without
+noise after learning)."""
 MAX_EXECUTED = 500
-"""Largest number of runs of a method on a task that are executed again and have signatures."""
+"""Largest number of runs of a method on a task that are executed again and have signatures: the
+first solved runs."""
 
 
 def check_study(study: object) -> None:
-    """Raise CoarticError if an object is not a study of one world.
-
-    It can be the path of a folder, or a study of several worlds.
-    """
+    """Raise CoarticError if an object is not a :class:`Study` with runs in only one world."""
     if not isinstance(study, Study):
         raise CoarticError(
-            "the study must be one that coartic.analysis.load(folder) returns, not a "
-            f"{type(study).__name__}"
+            f"the study is a {type(study).__name__}; it must be one that "
+            "coartic.analysis.load(folder) returns"
         )
     _ = study.world
 
@@ -113,18 +118,24 @@ def load(folder: str | Path, *, against: str = "") -> Study:
     folder : str or pathlib.Path
         The folder, or ``"shipped"`` for the shipped results of suite ``comparison``.
     against : str
-        Id, label or title of a method of the folder. Table ``differences`` compares the other
-        methods with it.
+        Id, label or title of a method of the folder, with which table ``differences`` compares the
+        other methods. By default, :func:`.list_differences` chooses the method.
 
     Returns
     -------
     Study
+        The runs of the folder. Gaps, tables and figures are computed when they are first used.
 
     Raises
     ------
     CoarticError
         The folder is not a results folder, runs of its suite are missing, or ``against`` does not
         name exactly one method.
+
+    Examples
+    --------
+    >>> study = load("results/comparison")  # doctest: +SKIP
+    >>> study.runs.groupby("label").gap.mean()  # doctest: +SKIP
     """
     folder = folder_named(folder)
     with open_results(folder) as store:
@@ -141,17 +152,20 @@ def load(folder: str | Path, *, against: str = "") -> Study:
 
 
 def _label_in(study: Study, name: str) -> str:
-    """Return the label of the method that a name means.
+    """Return the label of the method to which a user's name refers.
 
-    Labels are compared first, then ids, then titles. Ids of the learner's conditions can be short,
-    such as ``EC4``. Raises CoarticError if no method, or more than one, has the name.
+    The name is looked up first among the labels of the study's methods, then among their ids, and
+    then among their titles. An id of the learner can be shortened to its condition, such as
+    ``EC4``. Raises CoarticError if no method, or more than one, has the name.
     """
     methods = study.methods
     for names in (methods.index, methods.method_id, methods.title):
         for wanted in (name, f"{METHOD_PREFIX}{name}"):
             labels = [str(label) for label in methods.index[names == wanted]]
             if len(labels) > 1:
-                raise CoarticError(f"{name} names several methods; use one of {', '.join(labels)}")
+                raise CoarticError(
+                    f"method {name!r} is ambiguous; write one of the labels {', '.join(labels)}"
+                )
             if labels:
                 return labels[0]
     raise CoarticError(unknown("method", name, [*methods.index]))
@@ -161,30 +175,34 @@ def _label_in(study: Study, name: str) -> str:
 class Study:
     """The stored results of a folder.
 
-    If a folder has runs in several worlds, :attr:`worlds` has a study for each. Only such a study
-    has what compares runs: gaps and best known rewards, cells, executed runs, tables and figures.
+    If the folder has runs in several worlds, :attr:`worlds` has a study for each world. Attributes
+    and functions that compare runs (best known rewards, cells, executed runs, tables and figures)
+    need a study of one world, and otherwise raise CoarticError.
     """
 
     folder: Path
     plan: Sequence[Job]
-    """The cells of the suite, with the seed and the number of runs of each."""
+    """The jobs of the suite: each has a cell (a task, and a method with its setting), the seed, and
+    the numbers of the runs."""
     made_with: dict[str, Any]
     """Versions, platform, commit, command and date of the last ``coartic run``."""
     stored: pd.DataFrame
-    """Runs as stored, a row for each run. :attr:`runs` has further columns."""
+    """Runs as they are stored, a row for each run. :attr:`runs` has further columns."""
     marks: dict[str, list[str]] = field(default_factory=dict)
-    """Warnings about methods, by id: sentences on runs that do not reproduce, and on other versions
-    of packages."""
+    """Maps the id of a method to warnings about it: sentences about runs that do not reproduce, and
+    about other versions of packages."""
     against: str = ""
-    """Label of the method with which table ``differences`` compares the others; may be empty."""
+    """Label of the method with which table ``differences`` compares the others; empty if the user
+    has named none."""
     imports: dict[str, list[str]] = field(default_factory=dict)
-    """Names and versions of the packages that files of methods import, by the method's id."""
+    """Maps the id of a method from a file to the names and versions of the packages that the file
+    imports."""
     elsewhere: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """Rows of :attr:`methods` for methods that have runs only in other worlds of the folder. The
-    ranking lists them as not ranked."""
+    """Rows like those of :attr:`methods`, for methods that have runs only in other worlds of the
+    folder. The ranking lists these methods as not ranked."""
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for pickle, without the values that are computed from them."""
+        """Return the fields of the study for pickle, without the values computed from them."""
         return {stored.name: getattr(self, stored.name) for stored in fields(self)}
 
     @property
@@ -194,11 +212,12 @@ class Study:
 
     @cached_property
     def worlds(self) -> dict[str, Study]:
-        """A study for each world of the folder, which has only the runs in this world.
+        """A dict that maps each world of the folder to a study of its runs.
 
-        The keys say what differs from the paper's world, such as ``motor_noise=0.01``; the key of
-        the paper's world is the empty string. It comes first, the others follow in the order of the
-        suite. A study of one world is its own only entry.
+        A key names the constants in which the world differs from the paper's, such as
+        ``motor_noise=0.01``. The key of the paper's world is the empty string. The paper's world
+        comes first, and the others follow in the order of the suite. For a study of one world, the
+        only value is the study itself.
         """
         names = sorted({job.cell.world: None for job in self.plan}, key=bool)  # the paper's first
         if len(names) == 1:
@@ -225,9 +244,10 @@ class Study:
 
     @cached_property
     def world(self) -> str:
-        """What differs from the paper's world, such as ``motor_noise=0.01``, or the empty string.
+        """Name of the study's world, such as ``motor_noise=0.01``; empty for the paper's world.
 
-        Raises CoarticError for a study of several worlds.
+        The name has the constants in which the world differs from the paper's. Raises CoarticError
+        for a study of several worlds.
         """
         names = [*dict.fromkeys(job.cell.world for job in self.plan)]
         if len(names) > 1:
@@ -240,8 +260,11 @@ class Study:
 
     @cached_property
     def models(self) -> dict[str, MotionModel]:
-        """The model of the study's world, by name of the task: its tolerances depend on the radius
-        of the goals."""
+        """A dict that maps each task's name to the motion model of the world.
+
+        Models of tasks differ in tolerances that depend on the radius of the goals. Raises
+        CoarticError for a study of several worlds.
+        """
         _ = self.world
         return {job.cell.task.name: job.cell.model for job in self.plan}
 
@@ -252,10 +275,10 @@ class Study:
 
     @property
     def folder_in_commands(self) -> str:
-        """Path of the results folder for the commands that the report shows, quoted for a shell.
+        """Path of the results folder, quoted for a shell, for commands that the report shows.
 
         The path is relative to the working folder. If the results folder is not below the working
-        folder, only its name is returned.
+        folder, it is only the name of the folder.
         """
         path = Path(os.path.abspath(self.folder))  # without ..
         return quote(str(path.relative_to(Path.cwd()) if Path.cwd() in path.parents else path.name))
@@ -264,7 +287,7 @@ class Study:
     def question(self) -> tuple[str, str]:
         """Title and description of a user's suite that was run on its own tasks.
 
-        For other suites, both are empty.
+        For any other suite, both are empty strings.
         """
         title, description = self.made_with.get("question", ("", ""))
         return title, description
@@ -273,29 +296,35 @@ class Study:
     def varied(self) -> pd.DataFrame:
         """Values of the parameters that the study varies (:func:`.parameters_varied`).
 
-        It has a row for each label and a column for each parameter. It is empty if the study does
-        not vary parameters.
+        The frame has a row for each setting, indexed by its label, and a column for each parameter.
+        It is empty if the study does not vary parameters.
         """
         return parameters_varied(self.runs, self.declared)
 
     @cached_property
     def tasks(self) -> dict[str, Task]:
-        """Tasks by name; no two have the same title (:func:`.titled_apart`)."""
+        """A dict that maps the name of each task to the task.
+
+        Titles are changed where necessary, so that no two tasks have the same title
+        (:func:`.titled_apart`).
+        """
         tasks = {job.cell.task.name: job.cell.task for job in self.plan}
         return {task.name: task for task in titled_apart(tasks.values())}
 
     @cached_property
     def declared(self) -> dict[str, MethodInfo]:
-        """Declarations of the methods, by id without a setting."""
+        """A dict that maps the id of each method, without a setting, to its declaration."""
         return {job.cell.method.name: job.cell.method for job in self.plan}
 
     @cached_property
     def optima(self) -> dict[str, BestKnown]:
-        """Best known rewards with bounds and sources, by name of the task.
+        """A dict that maps each task's name to its best known reward.
 
-        Tasks without a best known reward are left out (:func:`.best_known`). If the reward of the
-        corrective process with its best hands is higher, it replaces the best known reward. In a
-        world with noise a reward is minus the mean ticks of 1,000 executions by noise of its own.
+        A best known reward has its bound and its source. Tasks without a best known reward are left
+        out (:func:`.best_known`). If the reward of the corrective process with its best hands is
+        higher than the best known reward, it replaces this reward. In a world with noise, a reward
+        is minus the mean ticks of 1,000 executions, whose noise differs from the noise by which
+        runs are judged.
         """
         fresh = self._executed_afresh if self.is_noisy else None
         runs, tasks = self.stored, self.tasks.values()
@@ -309,13 +338,17 @@ class Study:
         return rewards
 
     def _executed_afresh(self, task: str, run_ids: Sequence[str]) -> list[float]:
-        """Return minus the mean ticks of 1,000 executions of runs on a task in this noisy world."""
+        """Return minus the mean ticks of 1,000 noisy executions of each run in ``run_ids``."""
         with open_results(self.folder) as store:
             answers = [store.run(run_id).part("solution") for run_id in run_ids]
         return self._reference_values(task, answers)
 
     def _reference_values(self, task: str, answers: Sequence[Sequence[Movement]]) -> list[float]:
-        """Return minus the mean ticks of answers over executions by the reference's noise."""
+        """Return minus the mean ticks of 1,000 executions of each answer.
+
+        An answer is a sequence of movements. The noise is that of references (:func:`.judge`,
+        :func:`.reference_seed`).
+        """
         seeds = [reference_seed(self.plan[0].seed, task)] * len(answers)
         means, _ = judge(self.tasks[task], answers, self.models[task], seeds, FRESH_EXECUTIONS)
         return [-mean for mean in means.tolist()]
@@ -323,7 +356,9 @@ class Study:
     def _corrective_reference(self, task: str) -> tuple[float, str]:
         """Return the reward of the corrective process with its best hands, and these hands.
 
-        In a world with noise it is judged like a best known reward. The reward can be NaN.
+        The reward is in negative ticks. In a world with noise it is minus the mean ticks of 1,000
+        executions, as for a best known reward. It is NaN if the corrective process does not
+        complete the task; the hands are then the empty string.
         """
         if self.is_noisy:
             best = best_hands(self.tasks[task], self.models[task])
@@ -340,13 +375,16 @@ class Study:
 
     @cached_property
     def corrective_best(self) -> dict[str, float]:
-        """Reward (in negative ticks) of the corrective process alone with its best hands, by task.
+        """A dict that maps each task's name to the reward of the corrective process.
 
-        The gain, shares and targets start from this reward. For a task with more than 4,096 hand
-        sequences, it is the reward with the task's initial hands. The reward is NaN if the
-        corrective process does not complete the task with any of these hands, or if no hands are
-        found. In a world with noise it is the mean over the numbers of runs: the process meets the
-        draws by which the run of each number is judged.
+        The corrective process acts alone with its best hands. Shares of the possible gain, and
+        reward targets, start from this reward. It is in negative ticks. For a task with more than
+        4,096 hand sequences, it is the reward with the task's initial hands. It is NaN if the
+        corrective process does not complete the task with any of these hands.
+
+        In a world with noise, the corrective process is executed with the same noise by which the
+        runs are judged. As this noise depends on the number of the run, the reward is a mean over
+        the numbers of runs.
         """
         if self.is_noisy:
             return {
@@ -363,7 +401,13 @@ class Study:
 
     @cached_property
     def _corrective_by_number(self) -> dict[str, dict[int, float]]:
-        """Value of the corrective process in a world with noise, by task and number of a run."""
+        """Values of the corrective process in a noisy world, by task and run number.
+
+        The keys are names of tasks; each value is a dict that maps numbers of runs to values. The
+        value for a number is minus the mean ticks of the corrective process with its best hands,
+        executed with the noise by which runs of this number are judged. It is NaN if the corrective
+        process does not complete the task.
+        """
         by_task = {}
         for name, of_task in self.stored.groupby("task", sort=False):
             task, model = self.tasks[str(name)], self.models[str(name)]
@@ -383,25 +427,26 @@ class Study:
 
         Further columns:
 
-        - ``value``: what rankings compare, the reward, or in a world with noise minus
+        - ``value``: the number that rankings compare: the reward, or in a world with noise minus
           ``mean_ticks`` (:func:`.run_values`);
-        - ``motor_noise``, ``norm`` and ``base_weight``: the constants of the run's world;
-        - ``label``: the method with its setting;
-        - ``ranked_as``: the name of its row in the ranking. It differs from ``label`` if two
-          conditions of the learner, for one arm and for two arms, share a row;
-        - ``budget``: the number of trials that was asked for, missing for methods that do not use
-          the reward of each trial;
-        - ``note``: warnings about the method (:attr:`marks`), empty if there are none;
-        - ``family``, ``split``, number of ``goals`` and number of ``arms`` (1 or 2) of the task;
-        - ``best_known``: best known reward of the task in the run's world, missing if there is
-          none, and for a search with another base;
-        - ``corrective_best``: as in :attr:`corrective_best`; in a world with noise judged by the
-          same draws as the run;
+        - ``motor_noise``, ``norm`` and ``base_weight``: constants of the run's world;
+        - ``label``: label of the method: its id with its setting;
+        - ``ranked_as``: name of the row of the ranking in which the run counts. It differs from
+          ``label`` if two conditions of the learner, for one arm and for two arms, share a row;
+        - ``budget``: the number of trials that was asked for; missing for a method that does not
+          use the reward of each trial;
+        - ``note``: warnings about the method (:attr:`marks`); empty if there are none;
+        - ``family`` and ``split`` of the task, its number of ``goals``, and its number of ``arms``
+          (1 or 2);
+        - ``best_known``: best known reward of the task in the run's world; missing if no reward is
+          known, and for a run of a search with another base than the task's;
+        - ``corrective_best``: as in :attr:`corrective_best`. In a world with noise, it is the value
+          of the corrective process executed with the same noise by which the run is judged;
         - ``gap``: the gap of the value to the best known reward, as a share of it
           (:func:`.relative_gaps`). In noise it can be negative by chance;
-        - a column for each parameter of methods, unless there is a column of this name already.
-          ``trials`` is the number of trials that were made, and ``hands`` are the hands of the
-          solution.
+        - a column for each parameter of methods, except parameters with the name of another
+          column. Column ``trials`` is the number of trials that the run made, and column ``hands``
+          has the hands of the solution.
         """
         if len(self.worlds) > 1:
             parts = [study.runs for study in self.worlds.values()]
@@ -444,19 +489,20 @@ class Study:
 
     @cached_property
     def methods(self) -> pd.DataFrame:
-        """A row for each method with its setting, by label, in the order of lists and figures.
+        """A row for each setting of each method, in the order of lists and figures.
 
-        Two conditions of the learner that are ranked as one, such as EC1 on tasks for one arm and
-        EC4 on tasks for two, have a further row, which copies most columns of the second condition.
-        Columns:
+        The frame is indexed by label. Two conditions of the learner that share a row of the
+        ranking, such as EC1 on tasks for one arm and EC4 on tasks for two arms, have a further row,
+        which copies most columns of the second condition. Columns:
 
         - ``method_id``: id of the method without a setting;
-        - ``condition``: id of the learner's condition, such as ``EC4``, also if informed or an
-          ablation; empty for a user's own condition and for other methods;
+        - ``condition``: id of the learner's exploration condition, such as ``EC4`` (informed
+          conditions and ablations have ids of their own); empty for a user's own condition and for
+          other methods;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
         - ``title``: name on the page, in tables and figures;
         - ``short_title``: name in figures of one column;
-        - ``algorithm``: algorithm of which the method is a form;
+        - ``algorithm``: name of the algorithm, which several methods can share;
         - ``is_learner``: True for the paper's learner under the paper's conditions, with any
           setting;
         - ``is_search``: True for searches for the optimum;
@@ -465,18 +511,19 @@ class Study:
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
         - ``headline``: True if the method, with any setting, represents its algorithm;
-        - ``parent``: if this row is a setting or an ablation of another method, under which lists
-          show it, the label of that method; otherwise empty;
-        - ``style``: names of colour and marker in figures, a tuple of two strings. Write
-          ``methods["style"]``: ``methods.style`` is pandas' own.
+        - ``parent``: label of the method of which this row is a setting or an ablation, and below
+          which lists show it; empty for any other row;
+        - ``style``: names of the colour and the marker in figures, a tuple of two strings. Write
+          ``methods["style"]``, because ``methods.style`` is an attribute of pandas.
         """
         return methods_of(self.runs, self.declared, self.marks)
 
     @cached_property
     def cells(self) -> dict[CellKey, pd.DataFrame]:
-        """Runs, including failed runs, by task and label, in the plan's order.
+        """A dict that maps each cell to its runs, including failed runs.
 
-        Raises CoarticError for a study of several worlds, as what needs cells does.
+        Cells are in the order of the plan. A key has the name of the task and the label of the
+        method. Raises CoarticError for a study of several worlds.
         """
         check_study(self)
         runs = self.runs.copy(deep=False)
@@ -488,9 +535,9 @@ class Study:
         return cells
 
     def sequences(self, task: str) -> pd.DataFrame:
-        """Return the results of the corrective process alone on a task, by hand sequence.
+        """Return the reward of the corrective process alone on a task, for each hand sequence.
 
-        It acts in the study's world without motor noise.
+        The corrective process acts in the study's world, but without motor noise.
 
         Parameters
         ----------
@@ -500,9 +547,14 @@ class Study:
         Returns
         -------
         DataFrame
-            A row for each sequence, the best first: ``hands``, ``reward`` (in negative ticks,
-            missing if the trial failed) and ``reason`` of the failure. The frame has no rows if the
-            task has more than 4,096 sequences. The frame is cached: do not change it.
+            A row for each hand sequence, the highest reward first:
+
+            - ``hands``: the hand sequence, such as ``RRLR``;
+            - ``reward``: negative ticks, missing if the trial failed;
+            - ``reason``: why the trial failed, otherwise empty.
+
+            The frame has no rows if the task has more than 4,096 hand sequences. It is cached: do
+            not change it.
 
         Raises
         ------
@@ -524,7 +576,7 @@ class Study:
 
     @cached_property
     def solutions(self) -> pd.DataFrame:
-        """A row for each movement of the solutions of all runs.
+        """The stored solutions of all runs, with a row for each movement.
 
         Columns: ``run_id``, ``order``, ``goal``, ``hand``, ``kind``, ``ticks``, ``path``
         (docs/results.md).
@@ -534,10 +586,13 @@ class Study:
         return solutions[solutions.run_id.isin(self.stored.run_id)].reset_index(drop=True)
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the id and the rewards of the trials of each run that has stored them.
+        """Yield the rewards of the trials of each run for which they are stored.
 
-        Rewards are negative ticks, shape ``(trials,)``. They are NaN for trials that failed, and
-        for trials whose reward is not stored.
+        Yields
+        ------
+        (str, ndarray)
+            Id of the run, and rewards of its trials in negative ticks, shape ``(trials,)``. A
+            reward is NaN if the trial failed, or if its reward is not stored.
         """
         ids = {*self.stored.run_id}
         with open_results(self.folder) as store:
@@ -546,16 +601,19 @@ class Study:
                     yield run_id, rewards
 
     def executed(self, task: str, method: str, *, replay: bool = False) -> Solutions:
-        """Return the solved runs of a method on a task, executed again.
+        """Execute the solved runs of a method on a task again.
 
-        They are executed in the study's world without motor noise. For a run in noise, whose
-        answer has no ticks, the corrective process corrects what then misses a goal.
+        The runs are executed in the study's world, but without motor noise. In a world with noise,
+        a run stores movements without ticks; where such a movement misses its goal, the corrective
+        process goes on.
 
         Parameters
         ----------
-        task, method : str
-            Name of the task, and label of the method (its id and setting), such as
-            ``"random-search sigma=0.1"``. Conditions of the learner can be short: ``"EC4"``.
+        task : str
+            Name of the task.
+        method : str
+            Label of the method: its id with its setting, such as ``"random-search sigma=0.1"``. An
+            id of the learner can be shortened to its condition, such as ``"EC4"``.
         replay : bool
             True to execute the replay, a trial without noise after learning, instead of the
             solution.
@@ -563,14 +621,14 @@ class Study:
         Returns
         -------
         Solutions
-            Executions of the first 500 solved runs. With ``replay``, runs without a replay are left
-            out.
+            Executions of the first 500 solved runs. If ``replay`` is True, runs without a replay
+            are left out.
 
         Raises
         ------
         CoarticError
-            The folder has no runs of the method on the task, or the stored movements cannot be
-            executed or take other ticks than are stored.
+            The folder has no runs of the method on the task, the stored movements cannot be
+            executed, or their ticks differ from the stored ticks.
         """
         condition = f"{METHOD_PREFIX}{method}"  # conditions of the learner can be short: EC4
         if (task, method) not in self.cells and (task, condition) in self.cells:
@@ -636,23 +694,24 @@ class Study:
         *,
         replay: bool = False,
     ) -> pd.Series:
-        """Return a signature of coarticulation for all runs, or those of a method on a task.
+        """Return a signature of coarticulation for each run.
 
         Parameters
         ----------
         name : str
-            One of ``coartic.analysis.SIGNATURES``: ``"first"``, ``"arm"``, ``"hand"``, ...
+            Name of the signature: a key of ``coartic.analysis.SIGNATURES``, such as ``"first"``.
         task, method : str, optional
-            Name of a task, and label of a method (its id and setting). Unless both are given, all
-            runs are used.
+            Name of a task, and label of a method. The signature of all runs is returned unless both
+            are passed.
         replay : bool
             True to use the trial without noise after learning instead of the solution.
 
         Returns
         -------
         Series
-            Values by the index of :attr:`runs`. They are NaN for runs without the signature, for
-            failed runs, and for all but the first 500 solved runs of a method on a task.
+            Values in the unit of the signature, with the index of :attr:`runs`. A value is NaN for
+            a run without the signature, for a failed run, and for all but the first 500 solved runs
+            of a method on a task.
 
         Raises
         ------
@@ -677,10 +736,10 @@ class Study:
         return values_of_all.reindex(self.runs.index)
 
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
-        """Return the movements of solutions, or of replays, by run id.
+        """Return a dict that maps ids of runs to the movements of solutions or replays.
 
-        Only the first 500 solved runs of each method on each task are included. For ``"replay"``,
-        runs without a replay are left out.
+        ``part`` is ``"solution"`` or ``"replay"``. Only the first 500 solved runs of each method on
+        each task are included. For ``"replay"``, runs without a replay are left out.
         """
         if part not in self._movements:
             ids = {*self.stored.run_id}
@@ -707,10 +766,11 @@ class Study:
 
     @cached_property
     def individual_tasks(self) -> dict[str, Task]:
-        """Tasks that a report shows individually, by name.
+        """A dict that maps names to tasks: the tasks that a report shows individually.
 
-        If the study has more than eight instances of families, all instances are left out. Changed
-        instances, such as ``two-armed/v1/i017.radius-0.2``, count as instances.
+        These are all tasks of the study. If more than eight of them are instances of families
+        (random tasks), all instances are left out. A changed instance, such as
+        ``two-armed/v1/i017.radius-0.2``, counts as an instance.
         """
         drawn = {name for name in self.tasks if address_of(name.partition(".")[0]) is not None}
         left_out = drawn if len(drawn) > 8 else ()

@@ -1,12 +1,14 @@
-"""Tables of the report: functions of a study that return frames, by id in :data:`TABLES`.
+"""Define the tables of the report: functions of a study that return frames.
 
-The decorator :func:`table` makes a table from its caption, its columns and a function:
+:data:`TABLES` maps the id of each table to the table. The decorator :func:`table` makes a table
+from a caption, a string that describes its columns, and a function that yields its rows:
 
-- Each column is a line with its name, its heading, its number of decimals, and whether LaTeX
-  includes it.
-- The function yields the rows as pairs of a row's name and its values by column name.
-- Each column must have a value (which may be NaN) in at least one row, and each value must belong
-  to a column.
+- The string has a line for each column, with the name of the column, its heading, its number of
+  decimals, and ``tex`` if LaTeX includes the column.
+- The function yields a pair for each row: the name of the row, and a dict that maps names of
+  columns to values.
+- At least one row must have an entry (which may be NaN) for each column, and each entry of a row
+  must belong to a column.
 """
 
 from __future__ import annotations
@@ -105,7 +107,8 @@ from coartic.runs.plan import world_title
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
-"""Pairs of a row's name and the row: its values by column name."""
+"""Iterator over the rows of a table: pairs of the name of a row, and a dict that maps names of
+columns to values."""
 SHORT_ID = 8
 """Number of characters of a run's id that tables show; commands accept such a prefix."""
 _FORMULA = ("=", "+", "-", "@")
@@ -117,31 +120,34 @@ class Column(NamedTuple):
     """A column of a table, with heading and format."""
 
     name: str
-    """Name in the CSV file, or the prefix of several names if ``ending`` has ``*``."""
+    """Name of the column in the CSV file, or the common prefix of the names of several columns if
+    ``ending`` has ``*``."""
     ending: str = ""
-    """What the column consists of in the CSV file:
+    """Which columns of the CSV file belong to this column:
 
-    - empty: one column;
-    - ``[]``: the column and its interval (``gap_low``, ``gap_high``);
-    - ``±``: the column and its standard deviation (``ours_sd``);
+    - empty: only the column ``name``;
+    - ``[]``: this column, and the ends of its interval (such as ``gap_low`` and ``gap_high``);
+    - ``±``: this column, and its standard deviation (such as ``ours_sd``);
     - ``*``: all columns whose names start with ``name``;
-    - ``[*]``: all these columns, each with its interval.
+    - ``[*]``: all columns whose names start with ``name``, each with the ends of its interval.
     """
     heading: str = ""
-    """Heading; ``{}`` stands for the part of a name after the prefix, such as a task. If the
-    heading has ``(%)``, shares are shown in per cent. If it is empty, only the CSV file has the
-    column."""
+    """Heading on the page and in LaTeX. ``{}`` stands for the part of the column's name after the
+    prefix, such as the name of a task. If the heading contains ``(%)``, fractions are multiplied by
+    100. If the heading is empty, only the CSV file has the column."""
     digits: str = ""
-    """Number of decimals; ``p`` for a p-value; if empty, :func:`.number` chooses."""
+    """Number of decimals, or ``p`` for a p-value. If it is empty, :func:`.number` chooses the
+    number of decimals."""
     in_latex: bool = False
     """True if LaTeX also has the column."""
 
 
 def _column_of(line: str) -> Column:
-    """Return the column that a line describes.
+    """Return the column that a line of a table's definition describes.
 
-    The parts of a line, such as ``gap[] | gap (%) | 1 | tex``, are the name with its ending
-    (:class:`Column`), heading, decimals and ``tex``. The last parts can be left out.
+    A line, such as ``gap[] | gap (%) | 1 | tex``, has up to four parts: the name of the column with
+    its ending (:class:`Column`), the heading, the number of decimals, and ``tex`` if LaTeX includes
+    the column. Parts at the end can be left out.
     """
     name, heading, digits, tex = (*map(str.strip, line.split("|")), "", "", "")[:4]
     ending = next((ending for ending in ("[]", "±", "[*]", "*") if name.endswith(ending)), "")
@@ -154,28 +160,32 @@ class Table:
 
     id: str
     caption: str
-    """Caption; ``{tasks}`` stands for the number of ranked tasks, ``{reference}`` for the name of
-    the rewards from which gaps are measured."""
+    """Caption. ``{tasks}`` stands for the number of ranked tasks, and ``{reference}`` for the name
+    of the rewards from which gaps are measured (:func:`.reference`)."""
     columns: tuple[Column, ...]
-    """Columns of the CSV file in order. The last is ``run_ids``: the runs behind each row."""
+    """Columns of the CSV file, in order. The last is ``run_ids``: the ids of the runs from which
+    each row is computed."""
     rows: Callable[[Study], Rows]
-    """Function of a study that yields pairs of a row's name and its values by column name."""
+    """Function of a study that yields the rows, each as a pair: the name of the row, and a dict
+    that maps names of columns to values."""
     with_settings: bool = False
-    """True if page and LaTeX also show settings and ablations of methods in the table."""
+    """True if page and LaTeX also show rows of settings and ablations of other methods in the
+    table."""
 
     def __call__(self, study: Study) -> pd.DataFrame:
-        """Return the table of a study, indexed by the names of the rows.
+        """Return the table of a study as a frame, indexed by row names.
 
-        Intervals and deviations have columns that end in ``_low``, ``_high`` and ``_sd``. Column
-        ``note`` has what marks methods with ‡ (:attr:`.Study.marks`). The frame is cached: do not
-        change it.
+        The ends of intervals are in columns whose names end in ``_low`` and ``_high``, and standard
+        deviations in columns whose names end in ``_sd``. Column ``note`` has the warnings about
+        methods, which mark their titles with ‡ (:attr:`.Study.marks`). The frame is cached: do not
+        change it. Raises CoarticError for a study of several worlds.
         """
         check_study(study)
         return _frame_of(self, study)
 
 
 TABLES: dict[str, Table] = {}
-"""Tables by id, in the order of this module."""
+"""Maps the id of each table to the table, in the order of this module."""
 
 
 def table(
@@ -183,9 +193,17 @@ def table(
 ) -> Callable[[Callable[[Study], Rows]], Table]:
     """Return a decorator that makes a table from a function that yields its rows.
 
-    The decorator enters the table in :data:`TABLES`. The id of the table is the function's name
-    without ``list_``, with dashes for underscores. ``columns`` has a line for each column
-    (:func:`_column_of`).
+    The decorator adds the table to :data:`TABLES`. The id of the table is the name of the function
+    without ``list_``, with dashes instead of underscores.
+
+    Parameters
+    ----------
+    caption : str
+        Caption (:attr:`Table.caption`).
+    columns : str
+        A line for each column (:func:`_column_of`).
+    with_settings : bool
+        True to show settings and ablations of methods, too (:attr:`Table.with_settings`).
     """
     parts = [_column_of(line) for line in columns.splitlines() if line.strip()]
 
@@ -199,9 +217,9 @@ def table(
 
 @lru_cache(maxsize=64)  # of two or three studies
 def _frame_of(table: Table, study: Study) -> pd.DataFrame:
-    """Return a table of a study.
+    """Return a table of a study as a frame (:meth:`Table.__call__`).
 
-    Raises KeyError if a value has no column, or a column has no value in any row.
+    Raises KeyError if an entry of a row has no column, or if no row has an entry for a column.
     """
     named = list(table.rows(study))
     rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
@@ -221,9 +239,10 @@ def _frame_of(table: Table, study: Study) -> pd.DataFrame:
 
 
 def _with_marks(rows: pd.DataFrame, study: Study) -> pd.DataFrame:
-    """Return rows with the warnings about their methods (:attr:`.Study.marks`) in column ``note``.
+    """Add the warnings about methods (:attr:`.Study.marks`) to column ``note`` of a table.
 
-    A table of methods without this column gets it, before ``run_ids``, if there are warnings.
+    If the study has warnings and the table has methods but no column ``note``, this column is
+    inserted before ``run_ids``. The result is returned.
     """
     columns = [name for name in ("method", "against") if name in rows]
     if not (study.marks and columns):
@@ -239,10 +258,12 @@ def _with_marks(rows: pd.DataFrame, study: Study) -> pd.DataFrame:
 
 
 def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
-    """Return True for rows whose method is a setting or an ablation of another row's method.
+    """Return whether each row is a setting or ablation of another row's method.
 
-    Methods are compared by column ``against`` if the table has it, otherwise by ``method``. Column
-    ``parent`` of :attr:`.Study.methods` says of which method a method is a setting or an ablation.
+    The method of a row is the label in column ``against``, if the table has this column, otherwise
+    the label in column ``method``. Column ``parent`` of :attr:`.Study.methods` names the method of
+    which it is a setting or an ablation. The result is a Series of booleans with the index of
+    ``frame``; all are False for a table without methods.
     """
     if "method" not in frame:
         return pd.Series(False, frame.index)
@@ -251,17 +272,22 @@ def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
 
 
 def caption_of(table: Table, study: Study) -> str:
-    """Return the caption of a table with the study's number of tasks, reference and world."""
+    """Return the caption of a table, filled in for a study.
+
+    It has the number of ranked tasks, the name of the best known rewards, and the world if it is
+    not the paper's.
+    """
     caption = table.caption.replace("{tasks}", pluralize(len(ranked_tasks(study)), "task"))
     caption = caption.replace("{reference}", reference(study, study.optima))
     return caption + f" ({world_title(study.world)})" * bool(study.world)
 
 
 def csv_of_worlds(frames: Mapping[str, pd.DataFrame]) -> str:
-    """Return a table of several worlds, keyed by world (:attr:`.Study.worlds`), as CSV.
+    """Return a table of all worlds of a folder as one CSV file.
 
-    The rows of all worlds are in one file, so that one frame has them, and column ``world`` tells
-    them apart. It is left out if there is only the paper's world.
+    ``frames`` maps each world (:attr:`.Study.worlds`) to the table in this world. The first column
+    of the file, ``world``, has the world of the row. It is left out if the folder has only the
+    paper's world.
     """
     if [*frames] == [""]:
         return csv_of(frames[""])
@@ -276,7 +302,8 @@ def csv_of_worlds(frames: Mapping[str, pd.DataFrame]) -> str:
 def csv_of(frame: pd.DataFrame) -> str:
     """Return a table as CSV.
 
-    Strings that a spreadsheet would treat as formulas get an apostrophe in front.
+    A string that a spreadsheet would read as a formula gets an apostrophe before its first
+    character.
     """
 
     def guarded(value: Any) -> Any:
@@ -290,7 +317,7 @@ class ShownColumn(NamedTuple):
 
     heading: str
     texts: list[str]
-    """Values as strings, with their SDs and intervals, row by row."""
+    """A string for each row: the value, with its standard deviation or interval if it has one."""
     is_number: bool
     """True if all values are numbers or booleans, or all are missing."""
 
@@ -298,11 +325,21 @@ class ShownColumn(NamedTuple):
 def shown_columns(
     table: Table, study: Study, frame: pd.DataFrame, *, in_latex: bool = False
 ) -> dict[str, ShownColumn]:
-    """Return the columns that page and LaTeX show, by name.
+    """Return a dict that maps names to columns as page and LaTeX show them.
 
-    These are the columns with a heading and at least one value. SDs and intervals are in the column
-    of their number. Methods, tasks and uses of the reward have their titles; reconstructed tasks
-    have a †. With ``in_latex``, only the columns that LaTeX has are returned.
+    These are the columns that have a heading and at least one value. A standard deviation or an
+    interval is shown in the column of its number. Methods, tasks and uses of the reward are shown
+    by their titles, with † after reconstructed tasks.
+
+    Parameters
+    ----------
+    table : Table
+    study : Study
+        Study of one world.
+    frame : DataFrame
+        Rows of the table of this study.
+    in_latex : bool
+        True to return only the columns that LaTeX has.
     """
     titles = {
         **{str(task.family): str(task.family).split("/")[0] for task in study.tasks.values()},
@@ -350,9 +387,10 @@ def shown_columns(
 
 
 def _number_text(column: Column, value: float, *spread: float) -> str:
-    """Return a number as a string with its SD or interval.
+    """Return a number as a string, with its standard deviation or its interval.
 
-    SDs and intervals that are NaN, and intervals of length 0, are left out (:func:`.in_brackets`).
+    ``spread`` is empty, the standard deviation, or the two ends of the interval. A standard
+    deviation or interval that is NaN, and an interval of length 0, are left out.
     """
     decimals = int(column.digits) if column.digits.isdigit() else None
     if column.digits == "p":
@@ -366,8 +404,9 @@ def _number_text(column: Column, value: float, *spread: float) -> str:
 def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
     """Return a table as HTML, made by pandas' Styler.
 
-    - If the table has gaps on tasks, whose runs can be played, the cell in row 2 and column 3 has
-      the id ``T_ID_row2_col3``, where ``ID`` is the table's id with :func:`.ending_of`.
+    - If the table has gaps on single tasks, each cell has an id, with which the page links it to
+      runs that can be played. The cell in row 2 and column 3 has the id ``T_ID_row2_col3``, where
+      ``ID`` is the id of the table with the suffix of the world (:func:`.ending_of`).
     - Cells without a value are empty.
     - Cells of columns that are not numbers have the class ``text``.
     - Rows of methods from files have the class ``own``, unless all methods are from files.
@@ -404,8 +443,8 @@ def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
 def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[str] = ()) -> str:
     """Return a table as LaTeX with booktabs and longtable, made by pandas' Styler.
 
-    It has the columns that are marked with ``tex``. The sentences in ``notes`` follow the table;
-    if the table or a note has a dagger, its meaning is added.
+    The table has the columns that are marked with ``tex``. The sentences in ``notes`` follow below
+    the table. If the table or a note has a dagger, a sentence that explains it is added.
     """
     columns = shown_columns(table, study, frame, in_latex=True)
     cells = pd.DataFrame({name: map(latex, column.texts) for name, column in columns.items()})
@@ -429,27 +468,29 @@ def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[st
 
 
 def run_ids(*parts: pd.DataFrame) -> Row:
-    """Return a row with the entry ``run_ids``: the ids of all runs, separated by spaces.
+    """Return the entry ``run_ids`` of a row: the ids of all runs, separated by spaces.
 
-    ``parts`` are frames of runs.
+    ``parts`` are frames of runs, whose ids are joined. The result is a dict with the single key
+    ``run_ids``.
     """
     return {"run_ids": " ".join(" ".join(runs.run_id.tolist()) for runs in parts)}
 
 
 def _named(study: Study, runs: pd.DataFrame) -> Row:
-    """Return the entries ``task``, ``method``, ``runs`` and ``run_ids`` of a row.
+    """Return the entries of a row that name its task, method and runs.
 
-    ``runs`` are the runs of one method on one task. The entries are the title of the task
-    (:func:`.marked`), the label of the method, and the number and the ids of the runs.
+    The runs are of one method on one task. The entries are ``task`` (title of the task,
+    :func:`.marked`), ``method`` (label of the method), ``runs`` (number of runs) and ``run_ids``
+    (their ids).
     """
     task, label = marked(study.tasks[runs.task.iloc[0]]), runs.label.iloc[0]
     return {"task": task, "method": label, "runs": len(runs), **run_ids(runs)}
 
 
 ROUNDING = 1e-9
-"""Largest posture difference that counts as rounding; it mixes length unit and rad."""
+"""Largest posture difference, in length units and rad, that can be due to rounding."""
 _EARLY = 1_000
-"""Number of trials after which the ranking also reports the gap, as ``gap_early``."""
+"""Number of trials after which column ``gap_early`` of the ranking reports the gap."""
 BUDGETS = (100, 1_000, 10_000)
 """Numbers of trials after which the table of learning reports rewards."""
 COSTS = (
@@ -458,27 +499,30 @@ COSTS = (
     ("forward_kinematics_to_half", "forward_kinematics", 0.5),
     ("seconds_to_half", "solve_s", 0.5),
 )
-"""Columns of :func:`list_runtimes`: name, cost, and share of the targets to reach."""
+"""Columns of :func:`list_runtimes`. Each has its name, its cost (one of :data:`.SPENDS`), and the
+fraction of the targets that must be reached."""
 
 
 @lru_cache(maxsize=4)
 def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
     """Count the individual tasks on which each method is better or worse than the learner.
 
-    The learner is the one that explores most: EC1 on tasks for one arm, EC4 on tasks for two. A
-    task counts if
+    The learner is EC1 on a task for one arm, and EC4 on a task for two arms. A task counts if
 
-    - both methods solved all of their runs, and
-    - the mean rewards differ significantly, corrected over the tasks of the method (Holm).
+    - both methods solved all their runs on the task, and
+    - the means of their values differ significantly. The p-values are Holm-adjusted over the tasks
+      of the method.
 
-    The test is the two-sided exchange test. The reward of a deterministic method counts as exact,
-    and the test is then the bootstrap test. Runs with the same seed are not compared as pairs.
+    The test is the two-sided exchange test (:func:`.exchange_test`). The value of a deterministic
+    method is exact, and the test is then the bootstrap test (:func:`.bootstrap_test`). Runs with
+    the same seed are not compared as pairs.
 
     Returns
     -------
     dict
-        Numbers of tasks ``better`` and ``worse`` by label. A method is left out if no test could
-        have found a difference.
+        Maps the label of each method to a dict with the numbers of tasks on which it is ``better``
+        and ``worse``. A method is left out if even the smallest possible p-values would not be
+        significant after the adjustment.
     """
     counts = dict[str, dict[str, int]]()
     for label, stochastic in study.methods.stochastic.items():
@@ -509,12 +553,13 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
 
 
 def _mean_gap_after(study: Study, trials: int) -> pd.Series:
-    """Return the gap that each ranked method had after ``trials`` trials, a mean over tasks.
+    """Return the mean gap of each method after a number of trials, over tasks.
 
-    All are NaN in a world with noise, where the best trial so far is partly luck.
-
-    The gap of a run is the gap of its best trial so far. Runs without rewards of trials keep their
-    final gap. The mean is NaN if a run had no solution by then. The index has the labels.
+    The gap of a run is the gap of its best trial among the first ``trials`` trials. A run whose
+    rewards of trials are not stored has its final gap. The mean is over runs and then over tasks.
+    It is NaN if a run of the method had no solution after so many trials. All means are NaN in a
+    world with noise, where the best trial so far is partly luck. The result is indexed by the
+    labels of the rows of the ranking.
     """
     runs = compared_runs(study)
     if study.is_noisy:
@@ -534,7 +579,10 @@ def _mean_gap_after(study: Study, trials: int) -> pd.Series:
 
 
 def _standing_rows(study: Study, *, ranked: bool) -> Rows:
-    """Yield the rows of the methods of :func:`.standings` that are ranked, or of the others."""
+    """Yield the rows of ranked methods (:func:`.standings`), or of the other methods.
+
+    ``ranked`` is True for the methods that are ranked.
+    """
     rows = standings(study)
     rows = rows[(rows.why == "") == ranked]
     single = [task for task in ranked_tasks(study) if task in study.individual_tasks]
@@ -594,8 +642,9 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
 def list_ranking(study: Study) -> Rows:
     """Yield a row for each ranked method (:func:`.standings`), the smallest gap first.
 
-    It has the gap and the share of the gain, means over tasks; the gap on each individual task;
-    the gap after a thousand trials; and the mean costs of a run.
+    A row has the mean gap and the mean share of the possible gain over tasks, the gap on each
+    individual task, the mean gap after 1,000 trials, and the mean costs of a run. Gaps and shares
+    are fractions.
     """
     return _standing_rows(study, ranked=True)
 
@@ -620,8 +669,8 @@ def list_ranking(study: Study) -> Rows:
 def list_not_ranked(study: Study) -> Rows:
     """Yield a row for each method that is not ranked (:func:`.standings`), with the reason.
 
-    The row also has the gap on each individual task. If the method solved all tasks, but
-    with another number of trials, the row has its gap over tasks, too.
+    The row also has the gap on each individual task. If the method solved all runs, but with
+    another number of trials than the ranked methods, the row has its mean gap over tasks, too.
     """
     return _standing_rows(study, ranked=False)
 
@@ -640,24 +689,26 @@ def list_not_ranked(study: Study) -> Rows:
     """,
 )
 def list_differences(study: Study) -> Rows:
-    """Yield the difference of gaps of other methods from a reference method, smallest first.
+    """Yield the difference of each method's gap from that of a reference method.
 
-    The difference is the gap of the other method less the gap of the reference method, on the tasks
-    on which the reference method solved all runs. The reference method is
+    The difference is the mean gap of the other method minus the mean gap of the reference method,
+    over the tasks on which the reference method solved all runs. Rows are in ascending order of the
+    difference. The reference method is
 
     - :attr:`.Study.against`, if it is not empty;
-    - otherwise, if the study varies parameters, the first method of the ranking;
-    - otherwise each method from a file. It is then compared only with the built-in methods that
-      use the reward in the same way.
+    - otherwise, if the study varies parameters, the first setting of the ranking;
+    - otherwise each method from a file in turn. It is then compared only with the built-in methods
+      that use the reward in the same way.
 
     A method is left out if
 
-    - it has no runs or a failed run on one of these tasks;
-    - it was asked for another number of trials;
-    - it is a setting or an ablation of a method that ran (:attr:`.Study.methods`, ``parent``).
+    - on one of these tasks, it has no runs or a failed run;
+    - it was asked for another number of trials than the reference method;
+    - it is a setting or an ablation of a method that ran (column ``parent`` of
+      :attr:`.Study.methods`).
 
-    Intervals are for other runs on the same tasks. p is two-sided (:func:`.stratified_test`), and
-    corrected over the rows of the same reference method (Holm).
+    Intervals are for other runs on the same tasks. The p-values are two-sided
+    (:func:`.stratified_test`) and Holm-adjusted over the rows with the same reference method.
     """
     methods, rows = study.methods, standings(study)
     solved_some = [label for label in rows.index if solved_tasks(study, str(label))]
@@ -691,13 +742,15 @@ def list_differences(study: Study) -> Rows:
 
 
 _Gaps = Sequence[Array | float]
-"""Gaps on each task: of the runs of a method, shape ``(runs,)``, or an exact gap."""
+"""A list with an entry for each task: the gaps of a method's runs, shape ``(runs,)``, or a float
+that is the exact gap of a deterministic method."""
 
 
 def _gaps_by_task(study: Study, method: str, tasks: Sequence[str]) -> _Gaps:
-    """Return the gaps of a method (its label) on tasks on which it has runs, in their order.
+    """Return the gaps of a method on each task, in the order of ``tasks``.
 
-    Gaps of deterministic methods are exact.
+    ``method`` is its label. It must have runs on all these tasks. The gap of a deterministic method
+    is exact, a float.
     """
     by_task = runs_on(study, method, tasks).groupby("task").gap
     gaps = [by_task.get_group(task).to_numpy(np.float64) for task in tasks]
@@ -705,18 +758,18 @@ def _gaps_by_task(study: Study, method: str, tasks: Sequence[str]) -> _Gaps:
 
 
 def _mean_of_gaps(gaps: _Gaps) -> Estimate:
-    """Return the mean over tasks of the mean gap on each, with its interval for other runs.
+    """Return the mean gap over tasks, with its interval for other runs.
 
-    There is no interval if all gaps are exact.
+    It is the mean over tasks of the mean over runs. There is no interval if all gaps are exact.
     """
     return _sum_of_gaps([(1 / len(gaps), of) for of in gaps])
 
 
 def _difference_of_gaps(first: _Gaps, second: _Gaps) -> Estimate:
-    """Return the mean of the first gaps over tasks less that of the second gaps.
+    """Return the mean gap of a first method minus that of a second.
 
-    The interval is for other runs on these tasks. If all gaps are exact, there is no interval and
-    no p-value.
+    Both means are over the same tasks. The interval is for other runs on these tasks. The p-value
+    is that of :func:`.stratified_test`. If all gaps are exact, there is no interval and no p-value.
     """
     parts = [(sign / len(of), gaps) for sign, of in ((1, first), (-1, second)) for gaps in of]
     p = stratified_test([*zip(first, second, strict=True)])
@@ -724,7 +777,10 @@ def _difference_of_gaps(first: _Gaps, second: _Gaps) -> Estimate:
 
 
 def _sum_of_gaps(parts: Sequence[tuple[float, Array | float]]) -> Estimate:
-    """Return the weighted sum of means of gaps, with its interval for other runs."""
+    """Return a weighted sum of mean gaps, with its interval for other runs.
+
+    Each part is a pair: a weight, and the gaps of runs on a task or an exact gap.
+    """
     exact = sum(weight * gaps for weight, gaps in parts if isinstance(gaps, float))
     drawn = [(weight, gaps) for weight, gaps in parts if not isinstance(gaps, float)]
     if not drawn:
@@ -739,21 +795,27 @@ class ValueOfParameter(NamedTuple):
 
     value: Any
     labels: list[str]
-    """Labels of the settings that have this value. The labels of all values of a parameter are in
-    the same order of the values of the other parameters."""
+    """Labels of the settings that have this value. Settings at the same position in the lists of
+    two values of a parameter have the same values of all other parameters."""
     at_best: str
-    """Label of the one whose other values are those of the best setting; empty if there is
-    none."""
+    """Label of the setting with this value whose other parameters have the values of the best
+    setting; empty if there is none."""
 
 
 @lru_cache(maxsize=4)
 def values_of_parameters(study: Study) -> dict[str, list[ValueOfParameter]]:
-    """Return the values that are compared of each parameter that a study varies, by parameter.
+    """Return the values of each varied parameter that can be compared, with their settings.
 
-    Values are compared at equal values of the other parameters: settings count only if all values
-    of the parameter that are ranked at all are ranked with these other values. The list of a
-    parameter is empty if there are no such settings, or only one value is ranked. The dict is
-    empty if the study does not vary parameters, or fewer than two settings are ranked.
+    The values of a parameter are compared at equal values of all other parameters. Therefore a
+    combination of values of the other parameters counts only if the settings with this combination
+    are ranked for all values of the parameter that occur among ranked settings.
+
+    Returns
+    -------
+    dict of str to list of ValueOfParameter
+        Maps the name of each parameter to its values. The list is empty if no combination counts,
+        or if only one value is ranked. The dict is empty if the study does not vary parameters, or
+        if fewer than two settings are ranked. It is cached: do not change it.
     """
     ranked = standings(study).query("why == ''").index
     varied = study.varied[study.varied.index.isin(ranked)]
@@ -782,10 +844,12 @@ def values_of_parameters(study: Study) -> dict[str, list[ValueOfParameter]]:
 
 
 def gaps_of_settings(study: Study, labels: Sequence[str]) -> pd.Series:
-    """Return the gap of each run, a mean over settings, by task and number of the run.
+    """Return the mean gap, over settings, of runs with the same task and number.
 
-    Runs with the same number have the same seed, so they are the unit of resampling. Numbers that
-    not all settings have are left out.
+    Runs of different settings with the same number have the same seed. Therefore their mean is the
+    unit of resampling. ``labels`` are the labels of the settings. The result is a Series of
+    fractions, indexed by task and number of the run. It has only numbers of which each setting has
+    a run.
     """
     runs = compared_runs(study)
     runs = runs[runs.label.isin(labels)]
@@ -809,14 +873,17 @@ def gaps_of_settings(study: Study, labels: Sequence[str]) -> pd.Series:
     """,
 )
 def list_parameters(study: Study) -> Rows:
-    """Yield the gap of each value of the parameters that the study varies.
+    """Yield a row for each value of each parameter that the study varies.
 
-    The gap is a mean over the settings of a value (:func:`values_of_parameters`) and over tasks,
-    with its interval for other runs on the same tasks. ``at_best`` is the gap of the setting whose
-    other values are those of the best setting. ``difference`` and ``p_holm`` compare with the
-    value of the smallest gap, as in :func:`list_differences`; p is corrected over the values of the
-    parameter. ``default`` says what the default value is called. ``equal`` is True if at all values
-    each run of a setting has the same reward.
+    - ``gap``: mean gap over the settings with this value (:func:`values_of_parameters`) and over
+      tasks, a fraction, with its interval for other runs on the same tasks;
+    - ``at_best``: gap of the setting with this value whose other parameters have the values of the
+      best setting;
+    - ``difference`` and ``p_holm``: difference from the value with the smallest gap, and its
+      p-value, as in :func:`list_differences`. The p-values are Holm-adjusted over the values of the
+      parameter;
+    - ``default``: what the default value is called; empty for any other value;
+    - ``equal``: True if the parameter has no effect: each run has the same reward at all values.
     """
     tasks, ranks, methods = ranked_tasks(study), standings(study), study.methods
     for parameter, values in values_of_parameters(study).items():
@@ -852,9 +919,10 @@ def list_parameters(study: Study) -> Rows:
 
 
 def _are_equal(study: Study, settings: Sequence[Sequence[str]]) -> bool:
-    """Return True if each run has the same reward in all settings at the same place.
+    """Return True if each run has the same value at all values of a parameter.
 
-    ``settings`` has the labels of each value of a parameter, in the same order of the other values.
+    ``settings`` has a list of labels for each value of the parameter. Settings at the same position
+    in two lists differ only in this parameter; their runs are compared.
     """
     by_run = compared_runs(study).set_index(["task", "run"])
     for labels in zip(*settings, strict=True):
@@ -893,11 +961,12 @@ def _are_equal(study: Study, settings: Sequence[Sequence[str]]) -> bool:
     with_settings=True,
 )
 def list_contexts(study: Study) -> Rows:
-    """Yield a row for each method, pair of tasks, goal that both tasks share, and hand.
+    """Yield a row for each method, pair of tasks, shared goal, and hand.
 
-    It has the posture difference between the tasks with its verdict, the lean (:func:`.lean`), both
-    also of the base and of the joints alone, and the posture difference of random search. p is
-    corrected over the rows of a method (Holm).
+    A row has the posture difference between the two tasks, with a verdict, and the lean
+    (:func:`.lean`); both are also computed from the base alone and from the joints alone. For
+    comparison, it has the posture difference of random search. The p-values are Holm-adjusted over
+    the rows of the method.
     """
     for label in study.methods.index:
         contexts = list(shared_goals(study, label))
@@ -931,7 +1000,10 @@ def list_contexts(study: Study) -> Rows:
 
 
 def _columns_by_part(shared: TwoContexts) -> Row:
-    """Return posture difference, lean, and distance of the next postures of base and joints."""
+    """Return the columns of a comparison for the base and the joints alone.
+
+    They are the posture difference, the lean, and the distance between the mean next postures.
+    """
     row: Row = {}
     for part in ("base", "joints"):
         of_part = shared.of_part(part)
@@ -942,7 +1014,7 @@ def _columns_by_part(shared: TwoContexts) -> Row:
 
 
 def _columns_of(signature: Signature) -> str:
-    """Return the lines of the columns of a signature."""
+    """Return the lines that define the columns of a signature, for :func:`table`."""
     name, decimals = signature.column, signature.decimals
     tex, of_control = ("tex" * (part in signature.in_latex) for part in ("value", "control"))
     return f"""
@@ -969,16 +1041,17 @@ def _columns_of(signature: Signature) -> str:
 def list_signatures(study: Study) -> Rows:
     """Yield the signatures of each method, except searches, on each individual task.
 
-    There is a row for
+    A method has on each task
 
-    - each hand sequence that at least a tenth of the solved runs have (:func:`.with_control`);
-    - the choice of hands, with ``hands`` empty, if the task is for two arms and has at least two
-      goals.
+    - a row for each hand sequence that at least a tenth of its solved runs have
+      (:func:`.with_control`);
+    - a row for the choice of hands itself, whose ``hands`` are empty, if the task is for two arms
+      and has at least two goals.
 
-    Values are means over runs. For methods that select their solution from trials, the row also has
-    the signatures of random search, and p of the one-tailed exchange test, not corrected.
-    ``control_idle_arm`` says how random search treats the idle arm: ``with noise``, or ``still`` as
-    under EC3.
+    Signatures are means over runs. For a method that selects its solution from trials, a row also
+    has the signatures of random search, and the p-value of the one-sided exchange test, which is
+    not adjusted for multiple tests. Column ``control_idle_arm`` says how random search treats the
+    idle arm: ``with noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     # The row of the choice of hands is above those of hand sequences.
@@ -1018,11 +1091,12 @@ def list_signatures(study: Study) -> Rows:
 def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
     """Return the verdict on whether the posture at a shared goal depends on later goals.
 
-    - Stochastic methods: postures differ if the permutation test says so. They are the same if the
-      bootstrap test shows that their difference is below :data:`.SAME`.
-    - Deterministic methods: the difference itself decides both.
-    - If postures differ and the method selects its solution from trials, the difference is also
-      compared with that of random search.
+    - The postures of a stochastic method differ if the permutation test is significant. They are
+      the same if the bootstrap test shows that their difference is below :data:`.SAME`.
+    - The postures of a deterministic method differ if their difference exceeds :data:`ROUNDING`.
+      They are the same if it is below :data:`.SAME`.
+    - If postures differ, and the method selects its solution from trials, the difference must also
+      exceed that of random search significantly.
 
     Parameters
     ----------
@@ -1030,12 +1104,12 @@ def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
     shared : TwoContexts
         The runs on two tasks at the shared goal.
     row : dict
-        Other columns of :func:`list_contexts`.
+        The other columns of the row of :func:`list_contexts`.
 
     Returns
     -------
     str
-        Such as ``different postures``, ``the same posture`` or ``too few runs``.
+        The verdict, such as ``different postures``, ``the same posture`` or ``too few runs``.
     """
     method: Any = study.methods.loc[shared.method]
     if method.stochastic:
@@ -1075,10 +1149,10 @@ def list_saved(study: Study) -> Rows:
     """Yield how many ticks more than the corrective process each method takes for each goal.
 
     There is a row for each individual task and each method, except searches, that solved a run.
-    ``by_goal_1`` and so on, and their ``sum``, are means over runs: ticks of the run less the ticks
-    of the corrective process alone with the same hands. Runs with hands with which this process
-    fails are left out;
-    if no runs remain, so is the row.
+    Columns ``by_goal_1``, ``by_goal_2`` and so on, and their ``sum``, are means over runs: ticks of
+    the run minus the ticks of the corrective process alone with the same hand sequence. A run is
+    left out if the corrective process does not complete the task with the hands of the run. A row
+    without runs is left out.
     """
     for (task, label), runs in study.cells.items():
         if (
@@ -1111,13 +1185,14 @@ def list_saved(study: Study) -> Rows:
     """,
 )
 def list_runtimes(study: Study) -> Rows:
-    """Yield what it costs each method to reach a quarter and half of the targets (:data:`COSTS`).
+    """Yield the cost at which each method reaches a quarter and half of the targets.
 
-    Methods without a solution, or with an unknown number of trials, are left out, and so are
-    worlds with noise. The row also has
-    the share of targets reached. For methods that use the reward of each trial, ``half on *`` is
-    the median number of trials to the target halfway to the optimum on a task. It is infinite if
-    most runs do not reach this target.
+    The columns are those of :data:`COSTS`, and the fraction of targets that are ``reached`` at any
+    cost. For a method that uses the reward of each trial, each column ``half on TASK`` is the
+    median, over runs on this task, of the number of trials to the target halfway to the best known
+    reward. It is infinite if more than half of the runs do not reach this target. Methods without a
+    solution, or with an unknown number of trials, are left out. In a world with noise there are no
+    rows.
     """
     for method, runs in runs_with_targets(study).items():
         times = {spend: times_on_tasks(study, runs, spend) for spend in SPENDS}
@@ -1149,12 +1224,13 @@ def list_runtimes(study: Study) -> Rows:
     """,
 )
 def list_learning(study: Study) -> Rows:
-    """Yield the best reward of each method after some numbers of trials.
+    """Yield the mean best reward of each method after 100, 1,000 and 10,000 trials.
 
-    A method, unless it is a search, has a row for each individual task on which all of its runs
-    have a solution and made at least 100 trials. Rewards are means over runs, negative
-    ticks, after each number of trials in :data:`BUDGETS`. A reward is NaN if not all runs made so
-    many trials, or a run had no solution by then. In a world with noise there are no rows.
+    There is a row for each individual task and each method, except searches, if all runs of the
+    method on the task have a solution, stored rewards of their trials, and at least 100 trials.
+    Rewards are means over runs of the best reward so far, in negative ticks, after each number of
+    trials in :data:`BUDGETS`. A reward is NaN if a run made fewer trials, or had no solution after
+    so many trials. In a world with noise there are no rows.
     """
     if study.is_noisy:  # the best trial so far is partly luck
         return
@@ -1174,7 +1250,11 @@ def list_learning(study: Study) -> Rows:
 
 @lru_cache(maxsize=4)
 def _instances(study: Study) -> dict[str, list[str]]:
-    """Return the names of the instances (random tasks) with a best known reward, by family."""
+    """Return a dict that maps each family to the names of its instances.
+
+    Only instances with a best known reward count. Instances are random tasks of a family. The dict
+    is cached: do not change it.
+    """
     families: dict[str, list[str]] = {}
     for name in study.optima:
         if (family := study.tasks[name].family) is not None:
@@ -1200,7 +1280,7 @@ def instance_runs(study: Study) -> pd.DataFrame:
 
 
 def gaps_by_family(study: Study, runs: pd.DataFrame) -> Scores:
-    """Return the gaps of a method's runs on each instance, by family.
+    """Return a dict that maps each family to a method's gaps on its instances.
 
     Parameters
     ----------
@@ -1211,8 +1291,9 @@ def gaps_by_family(study: Study, runs: pd.DataFrame) -> Scores:
     Returns
     -------
     dict
-        For each family, a list of arrays of gaps, shape ``(n,)``, one for each instance. A family
-        is left out if one of its instances has no run in ``runs``.
+        Maps each family to a list with an array for each instance: the gaps of the runs on this
+        instance, fractions, shape ``(runs,)``. A family is left out if one of its instances has no
+        run in ``runs``.
     """
     return {
         str(family): [
@@ -1234,15 +1315,17 @@ def gaps_by_family(study: Study, runs: pd.DataFrame) -> Scores:
     """,
 )
 def list_family_gaps(study: Study) -> Rows:
-    """Yield the gap of each method that ran on instances, in each family and over families.
+    """Yield each method's mean gap on instances, by family and over families.
 
-    ``gap`` is over the families with two arms. Intervals are for other tasks of the families. If a
-    method did not solve all runs of all instances of a family, its gap in the family is NaN; if the
-    family has two arms, so is ``gap``.
+    Column ``gap`` is the mean over the families with two arms, and each column ``in FAMILY`` is the
+    mean in this family. They are fractions. Intervals are for other tasks of the families. If a
+    method did not solve all runs on all instances of a family, its gap in this family is NaN. If
+    this family has two arms, ``gap`` is NaN, too.
 
-    ``instances`` is the number of instances that the method solved in all runs; ``missing`` is the
-    number of the other instances. Both count families with two arms. If the method ran only on
-    families with one arm, they count these.
+    Column ``instances`` is the number of instances on which all runs of the method are solved, and
+    ``missing`` is the number of the other instances. Both count instances of families with two
+    arms, or, for a method that ran only on families with one arm, instances of the families on
+    which it ran.
     """
     solved_runs, rows, families = instance_runs(study), list[tuple[str, Row]](), _instances(study)
     two_armed = {family for family in families if len(study.tasks[families[family][0]].hands) > 1}
@@ -1279,11 +1362,12 @@ def list_family_gaps(study: Study) -> Rows:
     """,
 )
 def list_tasks(study: Study) -> Rows:
-    """Yield the best known reward of each individual task, and what corrections alone get.
+    """Yield each task's best known reward, and that of the corrective process alone.
 
-    ``initial`` and ``best_hands`` are the rewards of the corrective process alone with the
-    initial and with the best hands. All rewards are negative ticks. In a world with noise
-    ``initial`` is missing, and ``best_hands`` is the mean of :attr:`.Study.corrective_best`.
+    There is a row for each individual task. Columns ``initial`` and ``best_hands`` are the rewards
+    of the corrective process alone with the initial hands of the task and with the best hands. All
+    rewards are negative ticks. In a world with noise, ``initial`` is missing, and ``best_hands`` is
+    the reward of :attr:`.Study.corrective_best`.
     """
     for name, task in study.individual_tasks.items():
         best, locked = study.optima.get(name), " and ".join(task.locked_base)
@@ -1325,10 +1409,10 @@ def list_tasks(study: Study) -> Rows:
 def list_methods(study: Study) -> Rows:
     """Yield the rewards, hands and median costs of each method on each individual task.
 
-    Rewards are negative ticks, in a world with noise minus the mean ticks of a run. Within a task,
-    searches for the optimum come first; the other methods follow, the highest mean reward first.
-    ``median_run`` is the beginning of the id of the run whose value is nearest to the median, or
-    None if no run is solved.
+    Rewards are negative ticks; in a world with noise they are minus the mean ticks of a run. Within
+    a task, searches for the optimum come first, and the other methods follow. Both are in
+    descending order of the mean reward. Column ``median_run`` has the first characters of the id of
+    the run whose value is nearest to the median; it is None if no run is solved.
     """
     places, rows = {task: place for place, task in enumerate(study.individual_tasks)}, []
     for (task, label), runs in study.cells.items():
@@ -1365,9 +1449,10 @@ def list_methods(study: Study) -> Rows:
     """,
 )
 def list_failed(study: Study) -> Rows:
-    """Yield the number of failed runs of each method on each task, and why they failed.
+    """Yield the number of failed runs of each method and task, with reasons.
 
-    There is a row if at least one run failed. It has the three most frequent reasons.
+    There is a row for each method and task with at least one failed run. It has the three most
+    frequent reasons.
     """
     for (task, label), runs in study.cells.items():
         if len(solved(runs)) < len(runs):

@@ -5,24 +5,25 @@ opens ``FOLDER/runs.sqlite`` and checks that
 
 - the solution of each run (and the first trial and the replay of a learner) obeys the rules, hits
   all goals, and has the stored ticks, reward and hands;
-- no joint and no trial was changed afterwards, by a hash;
-- each run belongs to its task, method and parameters, by its id, its seed and its labels;
+- no joint angle and no reward of a trial was changed after the run, which a stored hash shows;
+- the id, the seed and the labels of each run are those of its task, method, parameters and world;
 - the folder has all runs that the plan asks for.
 
 The rules (Shah, Barto & Fagg 2013, *A Dual Process Account of Coarticulation in Motor Skill
 Acquisition*):
 
 - A robot, a mobile base with two arms, hits goals with its hands, in order. Each goal has one hand.
-- A configuration q has x and y of the base, then the angles of the left arm and of the right arm.
-- A movement goes straight from q to a target q^t in steps of length m. Its last step, which can be
-  shorter, ends at q^t.
+- A configuration q has x and y of the base (length units), then the joint angles of the left arm
+  and of the right arm (rad).
+- A movement goes straight from q to a target q^t in steps of length m in joint space. The last
+  step, which can be shorter, ends at q^t.
 - Before each step the robot checks whether to stop. It stops if its hand is within the radius of
   the goal (a hit). In a learned or planned movement, it also stops if its hand is within θ^a of the
   position that it would have at q^t (arrival).
-- k steps cost k ticks, and stopping costs one. The reward is minus the sum of all ticks.
-- The first movement for a goal is always made, unless it is corrective. Other movements are only
-  made while the goal is not hit.
-- A path leads through waypoints, and stops on a hit or at its end.
+- A step costs one tick, and stopping costs one more tick. The reward is minus the sum of all ticks.
+- The first movement for a goal is always made, unless it is corrective. Any other movement is only
+  made if the goal is not hit yet.
+- A movement of kind *path* leads through waypoints. It stops on a hit, or at its end.
 - The targets of corrective movements are stored; the corrective process is not run again.
 - With motor noise a run stores what its method recommends, without ticks: it is not executed.
 """
@@ -59,7 +60,7 @@ def need(holds: Any, words: str) -> None:
 
 
 WORLD = {"motor_noise": 0.0, "norm": "euclidean", "base_weight": 1.0}
-"""Constants of the paper's world, which cells leave out."""
+"""Constants of the paper's world. A stored cell leaves a constant out if it has this value."""
 
 # One bit of a hand's position can decide where a movement stops. Therefore it is computed in the
 # same order and with the same polynomials as in coartic: IEEE arithmetic then gives the same
@@ -72,8 +73,8 @@ C4, C6, C8, C10, C12, C14, C16 = ((-1) ** n / math.factorial(2 * n) for n in ran
 def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
     """Return the cosine and the sine of angles from -1e5 to 1e5 rad.
 
-    An angle is k quarters of a turn (π/2) plus a remainder. The Taylor series of the remainder is
-    computed.
+    Each angle is divided into k quarter turns (π/2) and a remainder. The cosine and the sine of the
+    remainder are computed from their Taylor series.
     """
     quarters = np.rint(angles * (2.0 / math.pi))
     x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
@@ -88,10 +89,11 @@ def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
 
 
 def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
-    """Return x and y of a hand for n configurations, shape ``(n,)`` each.
+    """Return x and y of a hand (length units) for n configurations.
 
-    ``q`` has the configurations in its columns. ``arm`` has the slice of the arm's joints, the
-    lengths of its links, and the shoulder's position.
+    Both have shape ``(n,)``. ``q``, shape ``(dof, n)``, has a configuration in each column. ``arm``
+    is a tuple of the slice of the arm's joints, the lengths of its links, and the position of its
+    shoulder on the base.
     """
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
@@ -103,10 +105,16 @@ def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
 
 @cache
 def stored_task(content: str) -> Any:
-    """Return the task of a cell from the cell's stored JSON.
+    """Return the task of a cell, read from the cell's stored JSON.
 
-    Further attributes are the constants of movement (``model``), the start (``q0``), locked
-    coordinates, arms, the hash of the cell (``digest``), and names of task, method, setting, world.
+    The task has the keys of a task file as attributes, and further attributes:
+
+    - ``model``: constants of the motion model;
+    - ``q0``: configuration at the start;
+    - ``locked``: indices of the locked coordinates of the base;
+    - ``arms``: maps each hand to its arm (:func:`hand_at`);
+    - ``digest``: hash of the cell;
+    - ``labels``: names of task, method, setting and world.
     """
     plain = json.loads(content)
     cell = json.loads(content, object_hook=lambda values: SimpleNamespace(**values))
@@ -130,7 +138,10 @@ def stored_task(content: str) -> Any:
 
 
 def scaled(changes: Floats, model: Any) -> Floats:
-    """Return the sizes of changes, shape ``(..., dof)``, whose norm is the length of a movement."""
+    """Return the sizes of changes of coordinates, whose norm is the length of a movement.
+
+    ``changes`` has shape ``(..., dof)``. Changes of the base are multiplied by their weight.
+    """
     sizes = np.abs(changes)
     sizes[..., :2] *= model.base_weight
     return sizes
@@ -139,8 +150,8 @@ def scaled(changes: Floats, model: Any) -> Floats:
 def straight_path_points(q: Floats, target: Floats, model: Any) -> Floats:
     """Return the points of a straight movement from ``q`` to a target, shape ``(dof, points)``.
 
-    They are spaced by a step of ``model`` in joint space; the last step can be shorter. Entries of
-    the target that are NaN stay.
+    The points are spaced by ``model.step`` in joint space; the last step can be shorter. A
+    coordinate whose entry in the target is NaN does not move.
     """
     target = np.where(np.isnan(target), q, target)
     difference = target - q
@@ -156,8 +167,8 @@ def straight_path_points(q: Floats, target: Floats, model: Any) -> Floats:
 def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
     """Return the points of a path from ``q`` through waypoints, shape ``(dof, points)``.
 
-    ``waypoints`` has a row for each waypoint. Point k, from 0, is k steps of ``model`` along the
-    path; the last point is its end.
+    ``waypoints`` has a row for each waypoint, shape ``(waypoints, dof)``. The points are spaced by
+    ``model.step`` along the path, beginning at ``q``; the last point is the end of the path.
     """
     corners = np.array([q, *waypoints])
     sizes = scaled(np.diff(corners, axis=0), model)
@@ -173,10 +184,10 @@ def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
 def make(
     task: Any, q: Floats, goal: int, hand: str, kind: str, corners: Floats
 ) -> tuple[Floats, int, bool]:
-    """Make a movement, and return where it stops, its ticks, and whether it hits.
+    """Make a movement, and return its end, its ticks, and whether it hits.
 
-    The movement starts at ``q``. ``corners`` has a row with the target, or a row for each waypoint
-    of a path.
+    The movement starts at ``q``. ``corners``, shape ``(rows, dof)``, has the target as its only
+    row, or a row for each waypoint of a path. ``goal`` is the number of the goal, from 1.
     """
     model, is_path = task.model, kind == "path"
     points = path(q, corners, model) if is_path else straight_path_points(q, corners[-1], model)
@@ -193,13 +204,14 @@ def make(
 
 
 def _recompute(task: Any, movements: list[list[Any]]) -> tuple[Any, ...]:
-    """Make all movements of a part of a run again.
+    """Make all movements of a part of a run again, and return its results.
 
-    Each movement is a list of its goal (from 1), hand, kind, ticks, and path as JSON. Raises
-    ValueError if a rule is broken or ticks differ from the stored ones.
+    Each movement is a list of its goal (from 1), hand, kind, ticks, and path as JSON.
 
-    Returns reward, letters of the hands, number of corrections, and the distance in joint space (in
-    rad) that idle arms travel, added over goals. In noise it only returns None and the letters.
+    The result is a tuple of the reward, the letters of the hands, the number of corrective
+    movements, and the distance in joint space (rad) that the idle arm travels, summed over goals.
+    With motor noise, it is a tuple of only None and the letters. Raises ValueError if a rule is
+    broken, or if ticks differ from the stored ticks.
     """
     goals = [movement[0] for movement in movements]
     order = [*range(1, len(task.goals) + 1)]
@@ -250,8 +262,9 @@ class Report(NamedTuple):
 def check_runs(folder: Path) -> Report:
     """Execute the stored movements of a results folder, and report what differs or is missing.
 
-    Runs that the last plan does not ask for are checked as well. No method is run. Raises an error,
-    such as sqlite3.Error, if the folder cannot be read.
+    Runs that the last plan does not ask for are checked, too. No method is run. Raises ValueError
+    if the file has an unknown format or is damaged, and another error, such as sqlite3.Error, if it
+    cannot be read.
     """
     # Mode rw, because SQLite must undo an unfinished batch.
     where = f"{(folder / 'runs.sqlite').absolute().as_uri()}?mode=rw"
@@ -278,9 +291,10 @@ def check_runs(folder: Path) -> Report:
 
 
 def _check_run(row: Any) -> int:
-    """Execute the movements of a run, and return their number.
+    """Execute the stored movements of a run, and return the number of movements.
 
-    Raises ValueError if the run differs from what is stored, or from what its id says.
+    Raises ValueError if the execution differs from the stored results, or if the run is not the one
+    to which its id, seed and labels belong.
     """
     need(row["content"], "its cell is missing")
     task = stored_task(row["content"])
@@ -309,7 +323,10 @@ def _check_run(row: Any) -> int:
 
 
 def main() -> int:
-    """Check the folder that the command line names; return 1 if it is not right, otherwise 0."""
+    """Check the results folder that the command line names, and print the result.
+
+    Returns 1 if a run differs or is missing, otherwise 0.
+    """
     report = check_runs(Path(sys.argv[1]))
     print(f"{report.runs} runs checked, {report.movements} movements executed.")
     print(*(report.wrong or ["Nothing differs."]), *report.unfinished, sep="\n")

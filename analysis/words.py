@@ -1,4 +1,4 @@
-"""Write numbers and names in the same way on the page, in tables and on the terminal."""
+"""Write numbers and names alike on the page, in tables and on the terminal."""
 
 from __future__ import annotations
 
@@ -31,28 +31,41 @@ _LATEX = str.maketrans(
         **{NARROW_SPACE: "\\,", "σ": "$\\sigma$", "ε": "$\\epsilon$"},
     }
 )
-"""Special characters of LaTeX and BibTeX, and symbols that coartic itself writes."""
+"""Translation table for ``str.translate``: special characters of LaTeX and BibTeX, and symbols that
+coartic itself writes, to LaTeX commands."""
 
 
 def id_of(function: Callable[..., Any]) -> str:
-    """Return the id of a table or figure from the name of its function.
+    """Return the id of a table or figure, made from the name of its function.
 
-    It is ``family-gaps`` for ``list_family_gaps``, and ``ranking`` for ``draw_ranking``.
+    The id is the name after its first underscore, with dashes instead of underscores:
+    ``family-gaps`` for ``list_family_gaps``, and ``ranking`` for ``draw_ranking``.
     """
     return function.__name__.partition("_")[2].replace("_", "-")
 
 
 def number(value: float, digits: _Digits | None = None) -> str:
-    """Return a number as a string, with a true minus sign; – for NaN.
-
-    Numbers from 10 000 on have narrow spaces between thousands.
+    """Return a number as a string, with a true minus sign.
 
     Parameters
     ----------
     value : float
+        The number. NaN becomes ``–``, and infinity ``∞``.
     digits : int, optional
-        Number of decimals. By default, integers have none, and other numbers have three significant
-        figures; very small ones have two, as in ``1.2e−05``.
+        Number of decimals. By default, an integer has no decimals, and any other number has three
+        significant figures. By default, a number between −0.0001 and 0.0001 has two significant
+        figures and an exponent, as in ``1.2e−05``.
+
+    Returns
+    -------
+    str
+        The number. If its absolute value is at least 10,000, narrow no-break spaces separate groups
+        of three digits.
+
+    Examples
+    --------
+    >>> number(-0.03821), number(319.0), number(0.5, 2)
+    ('−0.0382', '319', '0.50')
     """
     if math.isnan(value):
         return NONE
@@ -70,16 +83,20 @@ def number(value: float, digits: _Digits | None = None) -> str:
 
 
 def p_value(p: float) -> str:
-    """Return a p-value as ``p < 0.001`` or ``p = 0.012``, with no-break spaces; empty for NaN."""
+    """Return a p-value as ``p < 0.001`` or ``p = 0.012``, with no-break spaces.
+
+    The result is the empty string for NaN.
+    """
     if math.isnan(p):
         return ""
     return ("p < 0.001" if p < 0.001 else f"p = {p:.2g}").replace(" ", NO_BREAK)
 
 
 def in_brackets(low: float, high: float, digits: int | None = None) -> str:
-    """Return an interval as ``[1.3, 2.9]``, with ``digits`` decimals or as :func:`number` chooses.
+    """Return an interval as a string such as ``[1.3, 2.9]``.
 
-    The result is empty if an end is NaN, or if both ends are equal, because this would look like
+    ``digits`` is the number of decimals; by default :func:`number` chooses it. The result is the
+    empty string if an end is NaN, or if both ends are equal, because this would look like
     certainty.
     """
     if math.isnan(low) or math.isnan(high) or low == high:
@@ -93,15 +110,16 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
     Parameters
     ----------
     row : mapping
-        Row with ``column``, ``column_low`` and ``column_high``, such as a row of ``means``.
+        A row of a table, such as a row of :func:`coartic.analysis.means`. If ``column`` is
+        ``"gap"``, it must have the numbers ``gap``, ``gap_low`` and ``gap_high``.
     column : str
-        Name of the number.
+        Name of the column with the number.
     digits : int
-        Decimals.
+        Number of decimals.
     scale : float
-        Factor, such as 100 for a share in per cent.
+        Factor by which the three numbers are multiplied: 100 turns a fraction into per cent.
     unit : str
-        Unit after the number, such as ``" %"``.
+        Unit that is written after the number, such as ``" %"``.
 
     Returns
     -------
@@ -123,18 +141,21 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
     try:
         value, low, high = (scale * float(row[name]) for name in names)
     except (KeyError, IndexError, TypeError, ValueError, OverflowError):
-        raise CoarticError(f"the row must have the numbers {', '.join(names)}") from None
+        raise CoarticError(
+            f"the row lacks one of the numbers {', '.join(names)}; it must have all three"
+        ) from None
     return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()
 
 
 def titled_apart(tasks: Iterable[Task]) -> list[Task]:
-    """Return the tasks in order, with titles that differ.
+    """Return tasks in the same order, with titles that all differ.
 
     A task that needs another title is replaced by a copy with this title:
 
     - If a changed task, such as ``ascending.radius-0.2``, has the title of the original task, the
-      change is added: ``Ascending, radius-0.2``.
-    - If tasks then still have the same title, their names are added.
+      change is added to the title: ``Ascending, radius-0.2``.
+    - If several tasks still have the same title, the name of the task is added to each of these
+      titles.
     """
     tasks, titles = [*tasks], []
     for task in tasks:
@@ -153,29 +174,37 @@ def titled_apart(tasks: Iterable[Task]) -> list[Task]:
 
 
 def marked(task: Task) -> str:
-    """Return the title of a task, with † if it is reconstructed (:data:`RECONSTRUCTED`)."""
+    """Return the title of a task, followed by † if its goals are reconstructed.
+
+    :data:`RECONSTRUCTED` explains the dagger.
+    """
     return f"{task.label} †" if task.reconstructed else task.label
 
 
 def tally(names: Iterable[str]) -> str:
-    """Return how often each name occurs, as in ``LRLR 17, RRLR 3``; – for none.
+    """Return how often each name occurs, as in ``LRLR 17, RRLR 3``.
 
-    The most frequent name comes first; names that are equally frequent are in alphabetical order.
+    The most frequent name comes first. Names that are equally frequent are in alphabetical order.
+    The result is ``–`` if there are no names.
     """
     counts = Counter(sorted(names)).most_common()
     return ", ".join(f"{name} {count}" for name, count in counts) or NONE
 
 
 def commonest(texts: Iterable[str], most: int | None = 3) -> list[str]:
-    """Return the most frequent strings with their numbers, as in ``12 × no hit``.
+    """Return the most frequent strings with their counts, as in ``12 × no hit``.
 
-    The list has at most ``most`` strings; None stands for all.
+    The list is in descending order of frequency. It has at most ``most`` entries, or all if
+    ``most`` is None.
     """
     return [f"{count} × {text}" for text, count in Counter(texts).most_common(most)]
 
 
 def listed(words: Iterable[str]) -> str:
-    """Return words as a list, ``a, b and c``. Raises ValueError if there are none."""
+    """Return words as an enumeration, such as ``a, b and c``.
+
+    Raises ValueError if there are no words.
+    """
     *others, last = words
     return f"{', '.join(others)} and {last}" if others else last
 
@@ -186,7 +215,11 @@ def capital(text: str) -> str:
 
 
 def slugs(names: Iterable[str]) -> dict[str, str]:
-    """Return a different slug (small letters, digits, dashes) for each name: ``a-b``, ``a-b-2``."""
+    """Return a dict that maps each name to a unique slug for file names.
+
+    A slug has only small letters, digits and dashes, and at most 80 characters before a number. If
+    two names would have the same slug, such as ``a-b``, the second gets a number: ``a-b-2``.
+    """
     slug_of: dict[str, str] = {}
     for name in names:
         # Slugs are used in names of files, which must be short.
@@ -200,9 +233,9 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
 
 
 def ending_of(study: Study) -> str:
-    """Return the end of ids of tables and figures in a world, such as ``-motor-noise-0-01``.
+    """Return the suffix of ids of tables and figures in a world, such as ``-motor-noise-0-01``.
 
-    It is empty for the paper's world.
+    The suffix is empty for the paper's world. Raises CoarticError for a study of several worlds.
     """
     return f"-{slugs([study.world])[study.world]}" if study.world else ""
 
@@ -210,6 +243,6 @@ def ending_of(study: Study) -> str:
 def latex(text: object) -> str:
     """Return text as one printable line for LaTeX and BibTeX, with special characters escaped.
 
-    Letters that pdfLaTeX does not know are not changed; XeLaTeX and LuaLaTeX print them.
+    Letters that pdfLaTeX does not know are kept; XeLaTeX and LuaLaTeX print them.
     """
     return one_line(str(text)).translate(_LATEX)

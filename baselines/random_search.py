@@ -112,7 +112,7 @@ def draw_trials(
     attempts = Attempts(session, parameters.trials)
     trials = attempts.left
     if trials <= 0:
-        raise MethodError("infeasible", "no trial can be made: the trial budget is used up")
+        raise MethodError("infeasible", "the trial budget is used up, so that no trial can be made")
     attempts.run_corrective(*(sequences_of(session) if hands is None else [hands])[:trials])
     if not (chosen := attempts.hand_sequence):
         raise MethodError("infeasible", "the corrective process completes no hand sequence")

@@ -91,7 +91,10 @@ def shortest_plans(
         if plan.converged and (hands not in best or plan.cost < best[hands].cost):
             best[hands] = plan
     if not best:
-        raise MethodError("infeasible", f"none of {solves} solves found a path that hits all goals")
+        raise MethodError(
+            "infeasible",
+            f"task {task.name!r}: IPOPT converged in none of {solves} solves, so there is no path",
+        )
     ranked = sorted(best.values(), key=lambda plan: plan.cost)
     return ShortestPlans(ranked, solves, failed)
 

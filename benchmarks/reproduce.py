@@ -44,7 +44,9 @@ def find_run(prefix: str, folder: Path) -> Row:
             )
         if len(ids) > 1:
             listed = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
-            raise CoarticError(f"{len(ids)} run ids begin with {prefix!r}: {listed}")
+            raise CoarticError(
+                f"{prefix!r} is the beginning of {len(ids)} run ids ({listed}); write more digits"
+            )
         return store.run(ids[0])
 
 
@@ -179,8 +181,8 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
         ]
         if not ids:
             raise CoarticError(
-                f"no run of {folder} can be performed again: its methods have other versions or "
-                "other code here"
+                f"{folder} has no run that can be performed again: its methods have other versions "
+                "or other code here"
             )
         step = max(1, len(ids) // count)
         return [store.run(run_id) for run_id in ids[::step][:count]]

@@ -237,7 +237,7 @@ def perform(
     if not isinstance(executor, Local | Dask):
         raise CoarticError(f"executor is {brief_value(executor)}; it must be a Local or a Dask")
     if not plan:
-        raise CoarticError("the plan has no jobs")
+        raise CoarticError("plan is empty; it must have at least one job")
     with open_store_for_writing(folder) as store:
         store.replace_plan(plan, made_with())
         progress = Progress(folder, size_of(plan), outdated=store.count_outdated_runs())

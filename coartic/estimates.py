@@ -91,14 +91,15 @@ def vector(values: ArrayLike) -> Array:
     - has NaN, infinite or masked entries;
     - has an entry other than 0 whose size is not from 1e-100 to 1e100.
     """
-    sample = real_array("a sample", values)
+    sample = real_array("the sample", values)
     if sample.size == 0:
         raise ValueError("the sample is empty; it must have at least one value")
     size = np.abs(sample)
     usable = (size <= 1e100) & ((size >= 1e-100) | (size == 0))
     if sample.ndim != 1 or not usable.all():
         raise ValueError(
-            "a sample must be a vector; each value must be 0 or have a size from 1e-100 to 1e100"
+            f"the sample has shape {sample.shape} and values of sizes {size.min():g} to "
+            f"{size.max():g}; it must be a vector, each value 0 or of a size from 1e-100 to 1e100"
         )
     return sample
 
@@ -216,7 +217,7 @@ def mean_of_means(
         cannot be used (:func:`vector`).
     """
     if not samples:
-        raise ValueError("samples is empty; need at least one sample")
+        raise ValueError("samples is empty; it must have at least one sample")
     vectors = [*map(vector, samples)]
     parts = [*zip(vectors, weights, strict=True)]
     value = float(sum(weight * sample.mean() for sample, weight in parts))

@@ -437,7 +437,9 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> Any:
     try:
         from stable_baselines3.common.env_util import make_vec_env
     except ImportError:
-        raise MissingExtraError("coartic.gym.sb3 needs: pip install 'coartic[rl]'") from None
+        raise MissingExtraError(
+            "coartic.gym.sb3 needs Stable-Baselines3: pip install 'coartic[rl]'"
+        ) from None
     return make_vec_env(env, num_envs, wrapper_class=SharesOfTicks, env_kwargs=options)
 
 

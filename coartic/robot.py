@@ -195,7 +195,7 @@ class Robot:
         try:
             return self._arms[hand]
         except (KeyError, TypeError):
-            raise ValueError(f"unknown hand {hand!r}: a hand is 'left' or 'right'") from None
+            raise ValueError(f"hand is {hand!r}; it must be 'left' or 'right'") from None
 
     def joints(self, hand: Hand) -> slice:
         """Return the slice of a configuration that holds the joint angles of a hand's arm.
@@ -364,7 +364,7 @@ class Robot:
         arm = self.arm(hand)
         size = getattr(q, "numel", lambda: brief_value(q))()
         if size != self.dof:
-            raise ValueError(f"symbolic q has {size} entries; this robot needs {self.dof}")
+            raise ValueError(f"q has {size} symbolic entries; this robot needs {self.dof}")
         # Plain floats: a NumPy scalar times a CasADi symbol would call NumPy first.
         plain = arm._replace(links=arm.links.tolist())
         xs, ys = _points_of(q, plain, casadi.cos, casadi.sin)
@@ -409,11 +409,11 @@ class Robot:
     def _configuration(self, q: ArrayLike) -> Array:
         array = real_array("configuration", q)
         if array.ndim == 0 or array.shape[-1] != self.dof:
-            raise ValueError(
-                f"configuration has shape {array.shape}; this robot needs (..., {self.dof})"
-            )
+            raise ValueError(f"configuration has shape {array.shape}; it must be (..., {self.dof})")
         if not np.isfinite(array).all():
-            raise ValueError(f"configuration {brief_value(array.tolist())} is not finite")
+            raise ValueError(
+                f"configuration is {brief_value(array.tolist())}; all entries must be finite"
+            )
         return array
 
     def _numpy_chain(self, q: Array, hand: Hand) -> tuple[list[Any], list[Any]]:

@@ -1,4 +1,4 @@
-"""The site: `make docs` builds it, and ends at the first warning."""
+"""Configure Sphinx for the site, which ``make docs`` builds. Warnings are errors."""
 
 import os
 import re
@@ -90,13 +90,20 @@ def sh(line, cell):
 
 
 def pictures_named(section):
-    """Give the pictures of a section its heading as their alternative text."""
+    """Return a section of a page whose pictures have its heading as their alternative text.
+
+    ``section`` is Markdown with code cells. The text is returned with an option in each cell.
+    """
     heading, cell = section.partition("\n")[0].strip("# "), "```{code-cell} ipython3\n"
     return section.replace(cell, f'{cell}:mystnb: {{image: {{alt: "{heading}"}}}}\n')
 
 
 def write_pages():
-    """Write the pages of :data:`WRITTEN`: texts with links from their new places, and an index."""
+    """Copy the files of :data:`WRITTEN` to their pages.
+
+    Relative links are changed, because the pages are in other folders. The page of studies also
+    gets an index (toctree) of the pages of all studies.
+    """
     for source, page in WRITTEN.items():
 
         def moved(link, source=source, page=page):
@@ -114,10 +121,17 @@ write_pages()
 
 
 def setup(app):
-    """Let the pages be read in the repository and on the site alike."""
+    """Connect the functions that change pages and docstrings while Sphinx builds the site.
+
+    They make pages that are written for the repository work on the site, too.
+    """
 
     def links(app, name, source):
-        """Turn links to files that are not in this folder into links to their pages, or paths."""
+        """Replace links to files outside of ``docs``.
+
+        A link to a file that has a page (:data:`WRITTEN`) becomes a link to this page. Any other
+        link becomes its text, followed by the path of the file.
+        """
         folder = Path(app.env.doc2path(name)).parent
 
         def path_of(link):
@@ -131,12 +145,16 @@ def setup(app):
         source[0] = _OUTSIDE.sub(path_of, source[0])
 
     def fold(app, name, source):
-        """Add the pages that are folded under this one to its navigation."""
+        """Add a toctree of the pages folded under a page (:data:`FOLDED`)."""
         if name in FOLDED:
             source[0] += "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(FOLDED[name]) + "\n```\n"
 
     def code(app, name, source):
-        """Turn blocks of code into cells of a notebook: a file to save, commands, or Python."""
+        """Turn blocks of code on a page of :data:`NOTEBOOKS` into code cells.
+
+        A block is a file that is saved (its first line is a comment with the name), commands for a
+        shell, or Python code.
+        """
         if name not in NOTEBOOKS:
             return
         cell = "```{code-cell} ipython3\n"
@@ -151,11 +169,14 @@ def setup(app):
         source[0] = f"{_NOTEBOOK}{cell}:tags: [remove-cell]\n{_FIRST_CELL}```\n\n{text}"
 
     def bars(app, what, name, thing, options, lines):
-        """Escape |x|, a size, which would be a substitution in reStructuredText."""
+        """Escape the bars of an absolute value |x| in a docstring.
+
+        In reStructuredText they would mark a substitution.
+        """
         lines[:] = [_BAR.sub(r"\|", line) for line in lines]
 
     def once(app, what, name, thing, skip, options):
-        """Leave out the class Parameters where it is an attribute of Method."""
+        """Leave out the class Parameters as a member of a method's class."""
         return True if (what, name) == ("class", "Parameters") else None
 
     app.connect("autodoc-skip-member", once)

@@ -1,4 +1,4 @@
-"""The figures of ``docs/findings.md``: one dot plot for each finding, from stored tables.
+"""Draw the figures of ``docs/findings.md`` from stored tables, one figure for each finding.
 
 ``python docs/make_findings.py`` writes them into ``docs/stored/findings``.
 """
@@ -19,7 +19,8 @@ from coartic.analysis import mean
 from coartic.analysis.figures import dots, look_of, panels, style, styled
 
 Table = Callable[..., pd.DataFrame]
-"""Function that returns a stored table of a suite or a study by their names, and by its world."""
+"""Function that returns a stored table. Its arguments are the name of a suite or a study, the name
+of the table, and optionally the world."""
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 BLUE = look_of("dual-process/EC4")["color"]
 LEARNER, RANDOM = "dual-process (EC1, EC4)", "random-search"
@@ -29,12 +30,14 @@ METHODS = {
     LEARNER: ("the paper's learner", "dual-process/EC4"),
     RANDOM: ("random search", RANDOM),
 }
-"""Name of the methods of finding 4, and the method that has their look."""
+"""Maps the label of each method of finding 4 to its name in the figure, and to the id of the method
+whose look it has."""
 INFORMED = "dual-process (EC1-informed, EC4-informed)"
 NOISE = "motor_noise=0.01"
-"""The world of the second ranking, in the names of stored tables."""
+"""The world of the second ranking, as it stands in the names of stored tables."""
 FORMULA, REWARDS = style.GREEN, style.BLUE
-"""Colours of what a method knows: the reward as a formula, or the reward of each trial."""
+"""Colours of methods that use the reward as a formula, and of methods that use the reward of each
+trial."""
 RANKED = {
     "trajectory-optimisation/path-length": ("shortest-path plan", FORMULA),
     "posture-qp/goals-ahead": ("posture QP, goals ahead", FORMULA),
@@ -46,19 +49,28 @@ RANKED = {
     LEARNER: ("the paper's learner", REWARDS),
     RANDOM: ("random search", REWARDS),
 }
-"""Name and colour of the methods that are shown in two worlds."""
+"""Maps the label of each method that is shown in two worlds to its name and its colour in the
+figure."""
 NOTHING = (math.nan, math.nan, math.nan)
 _NUMBER = r"(−?\d+(?:\.\d+)?)"
 
 
 def estimate(row: Any, column: str, scale: float = 1) -> tuple[float, float, float]:
-    """Return the value of a column of a stored row, and the ends of its interval."""
+    """Return a value of a stored table's row, and the ends of its interval.
+
+    The ends are NaN if the table has no interval for the column. All three numbers are multiplied
+    by ``scale``.
+    """
     low, high = row.get(f"{column}_low", math.nan), row.get(f"{column}_high", math.nan)
     return scale * row[column], scale * low, scale * high
 
 
 def written(evidence: str, words: str) -> tuple[float, float, float]:
-    """Return the number with its interval that stands behind some words of a claim's evidence."""
+    """Return the number with its interval that follows some words in a claim's evidence.
+
+    The result has the number and the lower and upper end of its interval. All three numbers are NaN
+    if the evidence does not have these words with such a number.
+    """
     found = re.search(rf"{re.escape(words)}: {_NUMBER} \[{_NUMBER}, {_NUMBER}\]", evidence)
     if found is None:
         return NOTHING
@@ -72,9 +84,19 @@ def draw(
     looks: Sequence[tuple[str, str]] = (),
     dashed: Mapping[str, Sequence[float]] = MappingProxyType({}),
 ) -> Figure:
-    """Draw a dot plot with a panel for each quantity, and an estimate in it for each name.
+    """Draw a dot plot: a row for each name, a panel for each quantity.
 
-    ``dashed`` has the positions of dashed lines by quantity.
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the rows, from top to bottom.
+    quantities : dict of str to sequence of (float, float, float)
+        Maps the label of each quantity to an estimate for each name: value, and lower and upper end
+        of its interval.
+    looks : sequence of (str, str), optional
+        Colour and marker of each row; by default blue diamonds.
+    dashed : mapping of str to sequence of float, optional
+        Maps labels of quantities to the values at which their panels have dashed lines.
     """
     rows = pd.DataFrame({"name": names, "bold": False})
     rows[["color", "marker"]] = looks or [(BLUE, "D")] * len(rows)
@@ -85,7 +107,7 @@ def draw(
 
 @styled
 def first_movement(table: Table) -> Figure:
-    """Draw finding 2: how much slower the first movement is, and the whole task faster."""
+    """Draw finding 2: first movements are slower, and whole tasks are faster."""
     runs, equal = table("comparison", "signatures"), table("memory", "one_selection")
     scales = table("memory", "scales")
     names, first, whole = [], [], []
@@ -109,7 +131,11 @@ def first_movement(table: Table) -> Figure:
 
 @styled
 def early_gain(table: Table, early_less_late: Callable[[str], dict[str, float]]) -> Figure:
-    """Draw finding 3: gains of a hundred informed and of ten thousand trials by family."""
+    """Draw finding 3: gains of the informed learner and of the paper's learner.
+
+    The informed learner has 100 trials, and the paper's learner 10,000. There is a row for each
+    family. ``early_less_late`` is the function :func:`make_findings.early_less_late`.
+    """
     rows = table("dial", "results")
     drift = [estimate(rows.loc[f"{name} 1 0.01 next-goal"], "gain_100") for name in FAMILIES]
     paper = [estimate(rows.loc[f"{name} 0 0.05"], "gain_10000") for name in FAMILIES]
@@ -153,7 +179,11 @@ def gaps(table: Table) -> Figure:
 
 
 def over_random_tasks(tasks: pd.DataFrame) -> pd.DataFrame:
-    """Return the mean gap of each method over the random tasks with up to eight goals."""
+    """Return the mean gap of each method over random tasks of up to eight goals.
+
+    ``tasks`` is a stored table ``by-task``. The result has a row for each method, with the columns
+    ``gap``, ``gap_low`` and ``gap_high`` (fractions).
+    """
     drawn = tasks[~tasks.index.str.startswith("many-goals/")]
     labels = drawn.method.replace(
         {r"^dual-process/EC[14]$": LEARNER, r"^dual-process/.*-informed$": INFORMED}, regex=True
@@ -164,7 +194,10 @@ def over_random_tasks(tasks: pd.DataFrame) -> pd.DataFrame:
 
 @styled
 def two_worlds(table: Table) -> Figure:
-    """Draw the gap of each method without noise and with it, each practised and judged there."""
+    """Draw the gap of each method in worlds without and with motor noise.
+
+    In each world, methods practised and were judged in this world.
+    """
     worlds = {
         "the paper's four tasks": [table("comparison", "ranking", world) for world in ("", NOISE)],
         "200 random tasks": [
@@ -193,7 +226,7 @@ def two_worlds(table: Table) -> Figure:
 
 @styled
 def rewards(table: Table) -> Figure:
-    """Draw finding 5: rewards less the published ones, in per cent of these."""
+    """Draw finding 5: our mean rewards minus the published rewards, in per cent of these."""
     cells = table("replication", "rewards")
     cells = cells[cells.hands.isna() & cells.difference.notna()]
     label = "our mean reward less the published one (% of it; dashed: ± 1 %)"
@@ -204,7 +237,7 @@ def rewards(table: Table) -> Figure:
 
 @styled
 def idle_arms(table: Table) -> Figure:
-    """Draw finding 7: how much nearer the arms come to the next goal."""
+    """Draw finding 7: how much nearer to the next goal both arms come."""
     runs, claims = table("comparison", "signatures"), table("replication", "claims")
     moving = claims.loc["arm-coarticulation-in-general"]
     idle = claims.loc["other-arm-coarticulation-in-general"]
@@ -232,7 +265,7 @@ def idle_arms(table: Table) -> Figure:
 
 @styled
 def goals_ahead(table: Table) -> Figure:
-    """Draw finding 8: what each goal in view is worth to a planner."""
+    """Draw finding 8: how much a planner gains from each further goal that it considers."""
     whole, movement = table("horizon", "results"), table("horizon", "movements")
     ahead = range(5)
     name = "goals 6 or more h={}"
@@ -259,4 +292,4 @@ FIGURES: dict[str, Any] = {
     "arms": idle_arms,
     "goals-ahead": goals_ahead,
 }
-"""Each figure's function by the name of its file."""
+"""Maps the name of each figure's file to the function that draws the figure."""

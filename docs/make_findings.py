@@ -1,9 +1,12 @@
-"""Write the pages whose numbers come from stored results: ``python docs/make_findings.py``.
+"""Write the pages whose numbers come from stored results.
 
-``docs/stored`` has tables and figures of suites, with a folder for each suite. ``studies`` has
-those of studies. The templates ``*.md.jinja`` in this folder are filled in from them. With ``--from
-results`` the tables and figures that the pages ask for are first made again from the results
-folders below ``results``, and with ``--from shipped`` from the shipped results.
+    python docs/make_findings.py
+
+``docs/stored`` has a folder for each suite, with its tables and figures. ``studies`` has a folder
+for each study, with its tables. The script fills in the templates ``*.md.jinja`` of this folder
+from these tables. With ``--from results``, the tables and figures that the pages use are first made
+again from the results folders below ``results``; with ``--from shipped``, they are made again from
+the shipped results.
 """
 
 from __future__ import annotations
@@ -35,13 +38,17 @@ DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"
 STORED = DOCS / "stored"
 NEW = dict[str, Study]()
-"""Results that the command line names, by suite: what the pages ask for is made again of them."""
+"""Maps the name of each suite whose results the command line names to the study. Tables and figures
+of these suites are made again when a page uses them."""
 WIDTH = 3.5
 """Width of the figures of suites, in inches."""
 
 
 def unpack_shipped(folder: Path) -> Path:
-    """Unpack the shipped results into a folder for each suite below ``folder``, and return it."""
+    """Unpack the shipped results into ``folder``, with a subfolder for each suite.
+
+    Returns ``folder``.
+    """
     for suite in shipped_hashes():
         (folder / suite).mkdir()
         packed = SHIPPED_FOLDER / f"{suite}{PACKED}"
@@ -50,9 +57,11 @@ def unpack_shipped(folder: Path) -> Path:
 
 
 def make_table(study: Study, name: str) -> pd.DataFrame:
-    """Return a table of a study of one world, as it is stored: without ids of runs.
+    """Return a table of a study as it is stored, without ids of runs.
 
-    Table ``by-task`` is no table of the report: pages compute means over tasks from it.
+    The study must have one world. ``name`` is the id of a table of the report, or ``by-task``. The
+    latter is not a table of the report, but the result of :func:`coartic.analysis.by_task`, from
+    which pages compute means over tasks.
     """
     if name == "by-task":
         return by_task(study.runs).set_index("task")
@@ -61,9 +70,10 @@ def make_table(study: Study, name: str) -> pd.DataFrame:
 
 @cache
 def table(suite: str, name: str, world: str = "") -> pd.DataFrame:
-    """Return a stored table of a suite or a study in one world, with its rows by name.
+    """Return a stored table of a suite or a study, indexed by row names.
 
-    If the suite is in :data:`NEW`, the table is first made again.
+    If the suite is in :data:`NEW`, the table is first made again and stored. ``world`` is the world
+    of the table; the empty string stands for the paper's world.
     """
     folder = STUDIES / suite if (STUDIES / suite).is_dir() else STORED / suite
     path = folder / f"{f'{name}-in-{world}' if world else name}.csv"
@@ -74,12 +84,15 @@ def table(suite: str, name: str, world: str = "") -> pd.DataFrame:
 
 
 def row(suite: str, name: str, which: str) -> dict[Any, Any]:
-    """Return a row of a stored table. Raises KeyError if the table has no such row."""
+    """Return a row of a stored table as a dict.
+
+    Raises KeyError if the table has no row with the name ``which``.
+    """
     return table(suite, name).loc[which].to_dict()
 
 
 def claim(name: str, study: str = "replication") -> dict[Any, Any]:
-    """Return a judged claim of a study by its id."""
+    """Return a judged claim of a study as a dict; ``name`` is its id."""
     return row(study, "claims", name)
 
 
@@ -90,10 +103,11 @@ def cells_of_the_paper() -> pd.DataFrame:
 
 
 def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]:
-    """Return the numbers of claims on the paper's tasks, by verdict.
+    """Return how many claims about the paper's tasks have each verdict.
 
-    With ``others``, the three claims that carry the paper's point are left out. With ``published``,
-    claims that use reconstructed goals are left out.
+    The result is a dict that maps each verdict to the number of claims. If ``others`` is True, the
+    three claims that carry the main point of the paper are left out. If ``published`` is True,
+    claims about tasks with reconstructed goals are left out.
     """
     judged = table("replication", "claims")
     judged = judged[judged.suite != "families"]
@@ -107,9 +121,11 @@ def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]
 
 
 def seen(evidence: str, words: str, which: int = 0) -> str:
-    """Return the number that follows some words in the evidence, with its interval if it has one.
+    """Return the number that follows some words in a claim's evidence.
 
-    Raises IndexError if there is no such number.
+    The number has its interval, if the evidence has it. If the words occur several times, ``which``
+    says which occurrence is meant, from 0. The result is a string. Raises IndexError if there is no
+    such number.
     """
     estimate = r":?\s*(−?\d+(?:\.\d+)?(?: \[[^]]*\])?)"
     number_behind = re.escape(words) + estimate
@@ -117,15 +133,22 @@ def seen(evidence: str, words: str, which: int = 0) -> str:
 
 
 def p_of_shares(values: dict[Any, Any], published_runs: int) -> float:
-    """Return p of Fisher's exact test that ours and published runs learn a sequence as often."""
+    """Return the p-value of Fisher's exact test that compares our runs with the published runs.
+
+    The null hypothesis is that our runs and the published runs learn a hand sequence equally often.
+    ``values`` is a row of a stored table: ``runs`` of our ``of_runs`` runs learned the sequence,
+    and ``values["published_runs"]`` of the published runs, whose number is the argument
+    ``published_runs``.
+    """
     counts = (values["published_runs"], published_runs), (values["runs"], values["of_runs"])
     return float(stats.fisher_exact([[n, of - n] for n, of in counts]).pvalue)
 
 
 def published_spreads() -> pd.DataFrame:
-    """Return the published spreads (±) with the tests of both readings.
+    """Return the published spreads (±) of rewards, with tests of both readings.
 
-    The published spread of a hand sequence is compared with the runs that have this sequence.
+    A spread can be read as a standard deviation or as a standard error. The published spread of a
+    hand sequence is compared with our runs that have this sequence.
     """
     spreads = table("replication", "rewards").sort_values("hands", kind="stable")
     spreads = spreads.drop_duplicates(["task", "condition", "published_sd"]).dropna(subset="p_sd")
@@ -133,10 +156,10 @@ def published_spreads() -> pd.DataFrame:
 
 
 def gain_of_best_hands() -> float:
-    """Return the gain of the best hands of the corrective process over the initial hands.
+    """Return how much the corrective process gains from best instead of initial hands.
 
-    The gain is in per cent of the distance from the initial solution to the best known reward. It
-    is a mean over the random tasks of families with up to eight goals.
+    The gain is in per cent of the distance from the reward with the initial hands to the best known
+    reward. It is a mean over the random tasks of families with up to eight goals.
     """
     tasks = table("families", "by-task").query("method == 'corrective-alone/given'")
     share = tasks.share[~tasks.index.str.startswith("many-goals")]  # 0 is the best hands: negative
@@ -145,10 +168,12 @@ def gain_of_best_hands() -> float:
 
 @cache
 def early_less_late(family: str) -> dict[str, float]:
-    """Return how much more 100 trials with drift gain than 10,000 trials of the paper's learner.
+    """Return how much more the informed learner gains than the paper's learner.
 
-    ``more`` is a mean over the tasks of a family, in percentage points of the distance to the best
-    known reward, with its interval.
+    The informed learner has 100 trials, and the paper's learner has 10,000 trials. The result is a
+    dict with ``more`` and the ends of its interval, ``more_low`` and ``more_high``. ``more`` is the
+    difference of the gains, a mean over the tasks of a family. A gain is in per cent of the
+    distance from the reward of the corrective process to the best known reward.
     """
     runs = pd.read_csv(STUDIES / "dial" / "runs.csv.xz").query(f"family == '{family}'")
     way = runs.best_known - runs.corrective_best
@@ -162,13 +187,15 @@ def early_less_late(family: str) -> dict[str, float]:
 
 FOREIGN = ["task", "method", "setting", "run", "trials", "reward", "best_known", "gap"]
 POSTURE = ["at_x", "at_y", *(f"at_{joint}" for joint in range(1, 5))]
-"""Columns of the posture at goal 1 of the one-armed tasks: base and joints of the right arm."""
+"""Columns of the posture at goal 1 of the one-armed tasks: base (length units) and joints of the
+right arm (rad)."""
 
 
 def foreign_rows(study: Study) -> pd.DataFrame:
     """Return the runs of suite ``foreign`` or ``tuning``, with a row for each run.
 
-    Runs on the paper's one-armed tasks have the posture at goal 1.
+    The frame is indexed by task. Only solved runs are included. Runs on the paper's one-armed tasks
+    also have the posture at goal 1 (:data:`POSTURE`).
     """
     runs = study.runs[study.runs.status == "ok"]
     runs = runs.assign(method=runs.method.replace(r"dual-process/EC\d", "learner", regex=True))
@@ -183,11 +210,12 @@ def foreign_rows(study: Study) -> pd.DataFrame:
 
 
 def foreign_gaps() -> pd.DataFrame:
-    """Return the gaps of suite ``foreign`` (in per cent), with a row for each method and setting.
+    """Return the gaps of suite ``foreign``, with a row for each method and setting.
 
-    - ``gap``: gap on the paper's tasks, with an interval for other runs;
-    - ``random``: gap on random tasks, with an interval for other tasks;
-    - ``difference``: posture difference at the first goal of ascending and descending.
+    - ``gap``: mean gap on the paper's tasks, in per cent, with its interval for other runs;
+    - ``random``: mean gap on random tasks, in per cent, with its interval for other tasks;
+    - ``difference``: posture difference between ascending and descending at their first goal, in
+      length units and rad.
     """
     runs = pd.read_csv(STORED / "foreign" / "runs.csv").fillna({"setting": ""})
     names = (runs.method + " " + runs.setting).str.strip()
@@ -203,9 +231,10 @@ def foreign_gaps() -> pd.DataFrame:
 
 
 def shipped_gaps(method: str) -> dict[str, float]:
-    """Return a row as in :func:`foreign_gaps` for a method of the shipped suites.
+    """Return the gaps of a method of the shipped suites, as a row of :func:`foreign_gaps`.
 
-    The tasks are the same. On each random task, the gap is a mean over three runs.
+    The random tasks are those of suite ``foreign``. On each random task, the gap is a mean over
+    three runs.
     """
     paper = row("comparison", "ranking", method)
     tasks = table("families", "by-task").reset_index()
@@ -219,14 +248,14 @@ def shipped_gaps(method: str) -> dict[str, float]:
 
 
 MAX_LISTED = 6
-"""Largest number of cells of study ``worlds`` that a sentence lists."""
+"""Largest number of cells (pairs of world and family) of study ``worlds`` that a sentence lists."""
 
 
 def in_worlds(claim: str) -> str:
     """Return in words in which worlds and families a claim of study ``worlds`` holds.
 
-    A claim about lean has the family *one-armed* alone. Cells with a verdict are listed if they
-    are at most six, and otherwise counted.
+    A cell is a pair of a world and a family; a claim about the lean has only the family
+    *one-armed*. For each verdict, up to six cells are listed by name; more cells are only counted.
     """
     judged = table("worlds", "results").dropna(subset="verdict")
     judged = judged[judged.claim == claim]
@@ -254,7 +283,7 @@ def in_worlds(claim: str) -> str:
 
 
 def filled_pages() -> dict[str, str]:
-    """Return every page that is made from a template, by its path below ``docs``."""
+    """Fill in all templates, and return the pages by path below ``docs``."""
     replication = STUDIES / "replication"
     published = tomllib.loads((replication / "published.toml").read_text("utf-8"))
     values = {
@@ -282,7 +311,7 @@ def filled_pages() -> dict[str, str]:
 
 
 def figures() -> dict[str, bytes]:
-    """Return every figure of the findings as SVG, by its path below ``docs``."""
+    """Draw the figures of the findings, and return SVGs by path below ``docs``."""
     return {
         f"stored/findings/{name}.svg": stored_picture(
             draw, table, *[early_less_late] * (name == "early-gain")
@@ -292,15 +321,19 @@ def figures() -> dict[str, bytes]:
 
 
 def draw_figure(study: Study, name: str) -> bytes:
-    """Return a figure of a study of one world as SVG, as it is stored."""
+    """Return a figure of a study's report as SVG, as it is stored.
+
+    The study must have one world. ``name`` is the id of the figure.
+    """
     return stored_picture(lambda: FIGURES[name](study, width=WIDTH).figure)
 
 
 def forget_stored(results: dict[str, Study]) -> None:
-    """Remove the stored tables and figures of suites whose results are given.
+    """Remove the stored tables and figures of the suites for which new results are given.
 
-    Pages then store those that they ask for (:data:`NEW`). The runs of suite ``foreign`` are
-    stored at once.
+    ``results`` maps names of suites to studies, which are added to :data:`NEW`. Later, each page
+    stores the tables that it uses again. The tables of suites ``foreign`` and ``tuning`` are stored
+    at once instead.
     """
     for suite, name in (("foreign", "runs"), ("tuning", "tuning")):
         if suite in results:
@@ -314,7 +347,10 @@ def forget_stored(results: dict[str, Study]) -> None:
 
 
 def store_figures(pages: Iterable[str]) -> None:
-    """Draw the figures of the suites in :data:`NEW` that pages (texts) show."""
+    """Draw and store the figures of the suites in :data:`NEW` that pages show.
+
+    ``pages`` are the texts of the pages.
+    """
     for suite, name in {*re.findall(r"\bstored/([\w-]+)/([\w-]+)\.svg\)", "\n".join(pages))}:
         if suite in NEW:
             drawn = draw_figure(NEW[suite].worlds[""], name)

@@ -1,4 +1,7 @@
-"""The directive ``{made} NAME``: a table of the site that is made from the code's own data."""
+"""Define the directive ``{made} NAME``, which puts text made from code into pages.
+
+NAME is a function of this module that yields lines of Markdown, such as a table.
+"""
 
 from __future__ import annotations
 
@@ -35,12 +38,13 @@ STORY = {
     "correct": "The corrective process: follow the transposed Jacobian until the hand is there.",
     "execute": "How every method's solution is scored: movement after movement, minus the ticks.",
 }
-"""What the functions of the slow learner do, in the order of the story."""
+"""Maps functions of the slow reference learner to sentences on what they do, in the order of the
+page."""
 REPLICATION = Path(__file__).parents[1] / "studies" / "replication"
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """A table of Markdown."""
+    """Yield the lines of a Markdown table with these headings and rows of cells."""
     yield "| " + " | ".join(heads) + " |"
     yield "| " + " | ".join("---" for _ in heads) + " |"
     for row in rows:
@@ -49,7 +53,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
 
 
 def bare(kind: Any) -> Any:
-    """A type without metadata."""
+    """Return a type without the metadata of ``Annotated``, also within tuples, dicts and unions."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return bare(parts[0])
@@ -61,7 +65,7 @@ def bare(kind: Any) -> Any:
 
 
 def claims() -> Iterator[str]:
-    """Yield the table of the paper's claims; each has its id for an anchor."""
+    """Yield the table of the paper's claims, whose ids are anchors."""
     judged = pd.read_csv(REPLICATION / "claims.csv", index_col=0).fillna("–")
 
     def goals(name: str, claim: dict[str, Any]) -> str:
@@ -85,7 +89,7 @@ def claims() -> Iterator[str]:
 
 
 def margins() -> Iterator[str]:
-    """The margins of the claims, with the reason for each and its history."""
+    """Yield the table of the margins of claims, with their reasons and history."""
     entries = tomllib.loads((REPLICATION / "margins.toml").read_text("utf-8"))
     rows = ((f"`{name}`", f"{each['value']:g}", each["reason"]) for name, each in entries.items())
     yield from table(("margin", "value", "reason, and history if it was changed"), rows)
@@ -110,8 +114,12 @@ def tasks() -> Iterator[str]:
 
 
 def methods(group: str) -> Iterator[str]:
-    """Yield the table of the built-in methods that use the reward of trials, its ``formula``, or
-    ``none`` of it, with the first sentence of their classes and a letter for each information."""
+    """Yield the table of the built-in methods of one group.
+
+    ``group`` is ``trials`` (methods that use the reward of each trial), ``formula`` (methods that
+    use the reward as a formula) or ``none`` (methods that do not use the reward). A row has the
+    summary line of the method's class, and a letter for each kind of information that it uses.
+    """
     letters = dict(zip(Information, "GFJATUKNRS", strict=True))
 
     def group_of(uses: Sequence[Information]) -> str:
@@ -134,7 +142,10 @@ def methods(group: str) -> Iterator[str]:
 
 
 def baselines() -> Iterator[str]:
-    """Yield the reference of the modules of the built-in methods, without the learner's."""
+    """Yield the directives for the reference of the modules of built-in methods.
+
+    The module of the learner is left out.
+    """
     yield "```{eval-rst}"
     for module in MODULES:
         if module.startswith("coartic.baselines."):
@@ -143,7 +154,7 @@ def baselines() -> Iterator[str]:
 
 
 def tuned() -> Iterator[str]:
-    """Yield a list of what built-in methods were tuned on."""
+    """Yield a list of the tasks on which the constants of built-in methods were chosen."""
     names: dict[str, list[str]] = {}
     for name, info in built_in().items():
         names.setdefault(info.tuned_on, []).append(title_of(name))
@@ -152,15 +163,17 @@ def tuned() -> Iterator[str]:
 
 
 def signatures() -> Iterator[str]:
-    """Yield a list of the signatures of a run with their definitions."""
+    """Yield a list of the signatures of coarticulation, with their units and definitions."""
     for each in SIGNATURES.values():
         yield f"- `{each.name}` ({each.heading.rpartition('(')[2]}: {each.definition}"
     yield ""
 
 
 def slowly() -> Iterator[str]:
-    """Yield the slow and obvious learner of the tests, function by function: the docstring as a
-    paragraph, then the code."""
+    """Yield the slow reference learner of the tests, function by function.
+
+    For each function there are a heading, the sentences of :data:`STORY`, and the code.
+    """
     text = (Path(__file__).parents[1] / "tests" / "support" / "reference.py").read_text("utf-8")
     parts = {part.name: part for part in ast.parse(text).body if isinstance(part, ast.FunctionDef)}
     for name in ("learn", "_choose", "_explore", "correct", "execute"):
@@ -170,7 +183,7 @@ def slowly() -> Iterator[str]:
 
 
 def columns() -> Iterator[str]:
-    """Yield the table of the columns of view ``runs``."""
+    """Yield the table of the columns of the database view ``runs``, with their meanings."""
     from coartic.runs.record import COLUMNS
 
     rows = ((f"`{name}`", meaning) for name, *_, meaning in COLUMNS)
@@ -178,7 +191,7 @@ def columns() -> Iterator[str]:
 
 
 def play() -> Iterator[str]:
-    """The figure to play with, its text and its styles; ``play.html`` is its page."""
+    """Yield the interactive figure as HTML, with styles and a link to its page."""
     yield "```{raw} html"
     yield f"<style>{part_of_page('play.css')}</style>"
     yield player_figure([up_or_down(), *map(preset_of, shipped_tasks().values())], page="play.html")
@@ -188,7 +201,7 @@ def play() -> Iterator[str]:
 
 
 def first_screen() -> Iterator[str]:
-    """The first screen of README, to the section with the commands, with links from the site."""
+    """Yield the beginning of README, up to the commands, with links for the site."""
     text = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
     _, opening, first, *_ = re.split(r"(?m)^# .*\n|^(?=## )", text)
     text = re.sub(r"(?<=\]\()studies/(\w+)/README\.md", r"studies/\1.md", opening + first)
@@ -197,8 +210,11 @@ def first_screen() -> Iterator[str]:
 
 
 def finish(app: Sphinx, failure: Exception | None) -> None:
-    """Put the page of the figure beside the index, with a link to it, and give headings of the
-    navigation their level, which Sphinx leaves out."""
+    """Finish the site after a build without failure.
+
+    - Headings of the navigation get their level (``aria-level``), which Sphinx leaves out.
+    - The page of the interactive figure, ``play.html``, is written beside the index.
+    """
     if failure is None:
         for path in Path(app.outdir).rglob("*.html"):
             html = path.read_text("utf-8")
@@ -211,13 +227,13 @@ def finish(app: Sphinx, failure: Exception | None) -> None:
 
 
 class Made(SphinxDirective):
-    """Put the Markdown that a function of this file yields in the directive's place."""
+    """Directive that is replaced by the Markdown that a function of this module yields."""
 
     required_arguments = 1
     optional_arguments = 3
 
     def run(self) -> list[nodes.Node]:
-        """Return its nodes."""
+        """Call the function that the directive names, and return the nodes of its Markdown."""
         function, *arguments = self.arguments
         return self.parse_text_to_nodes("\n".join(globals()[function](*arguments)))
 
@@ -225,7 +241,11 @@ class Made(SphinxDirective):
 def plainly(
     app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str, returns: str
 ) -> tuple[str, str] | None:
-    """Show types without metadata, and a model without its signature, which repeats its fields."""
+    """Return the signature that autodoc shows.
+
+    A pydantic model gets no signature, because the signature would repeat its fields. Types in any
+    other signature are shown without the metadata of ``Annotated``.
+    """
     if what == "class" and "__pydantic_fields__" in vars(thing):
         annotations = thing.__annotations__
         fields = thing.__pydantic_fields__.items()
@@ -240,7 +260,7 @@ def plainly(
 
 
 def define(app: Sphinx, page: nodes.document, name: str) -> None:
-    """Give links to terms of the glossary their definitions, which browsers show on hover."""
+    """Give links to terms of the glossary their definitions, which browsers show."""
     terms = {
         key: section[1].astext().replace("\n", " ")
         for section in app.env.get_doctree("glossary").findall(nodes.section)
@@ -254,7 +274,7 @@ def define(app: Sphinx, page: nodes.document, name: str) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Register the directive, and what is done to each page and to the site."""
+    """Register the directive, and the functions that change pages and the built site."""
     app.add_directive("made", Made)
     app.connect("autodoc-process-signature", plainly)
     app.connect("doctree-resolved", define)

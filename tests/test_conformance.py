@@ -107,7 +107,9 @@ def test_what_a_session_shows_cannot_be_written():
     session.meter.trials = 0
     session.rewards.append(10**6)
     session.q0[:] = 9.0
-    with pytest.raises(ValueError, match="a method cannot set counter 'trials'"):
+    with pytest.raises(
+        ValueError, match="counter 'trials' cannot be added to by this method; it may add to"
+    ):
         session.spend(trials=-1)
     assert (session.meter.trials, session.rewards) == (1, [-319])
     assert session.q0.tolist() == task.q0.tolist()

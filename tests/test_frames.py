@@ -1,6 +1,7 @@
 """Plain frames of results and claims of a study: against slow and obvious counts."""
 
 import doctest
+import importlib
 import itertools
 
 import numpy as np
@@ -9,20 +10,24 @@ import pytest
 
 import coartic
 from coartic import CoarticError
-from coartic.analysis import ecdf, frames, running_times, signatures, statistics
+from coartic.analysis import ecdf, frames
 from coartic.analysis.signatures import SIGNATURES
 from coartic.analysis.words import p_value
-from coartic.learner import learning
-from common import judging
 from common.judging import judge, mean_beyond
 from tests.support.made_up import row, study_of
 
 
 @pytest.mark.parametrize(
-    "module", [signatures, frames, statistics, running_times, judging, learning]
+    "module",
+    [
+        *("analysis.figures.plot", "analysis.figures.style", "analysis.frames", "analysis.methods"),
+        *("analysis.recordings", "analysis.running_times", "analysis.signatures"),
+        *("analysis.statistics", "analysis.words", "learner.learning", "common.judging"),
+    ],
 )
 def test_examples(module):
-    failed, attempted = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+    code = importlib.import_module(module if module.startswith("common") else f"coartic.{module}")
+    failed, attempted = doctest.testmod(code, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert failed == 0 < attempted
 
 
@@ -78,7 +83,7 @@ def test_what_is_no_frame_and_no_argument_is_refused():
     frame = small_frame()
     for words, compute, *given in (
         ("no rows", frames.relative_gaps, frame[:0]),
-        ("must be a pandas.DataFrame, not a list", frames.ranking, [1]),
+        ("the frame is a list; it must be a pandas.DataFrame", frames.ranking, [1]),
         ("no column reward", frames.relative_gaps, frame[["best_known"]]),
         ("status has 'crashed'", frames.relative_gaps, frame.assign(status=["crashed", "ok"])),
         ("by is empty.*names", frames.means, frame, [], ["reward"]),
@@ -103,7 +108,7 @@ def test_a_task_that_a_method_lacks_is_not_reached():
     assert none.to_dict("records") == [{"method": "none", "trials": np.inf, "share": 0.0}]
     unknown = small_frame(task=["easy", "unknown"], method="a", best_known=[-300, np.nan])
     assert ecdf(unknown, [0.05]).share.tolist() == [1.0]
-    with pytest.raises(CoarticError, match="no best_known"):
+    with pytest.raises(CoarticError, match="best_known has no reward; targets need"):
         ecdf(unknown.assign(best_known=np.nan), [0.05])
 
 

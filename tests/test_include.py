@@ -183,7 +183,9 @@ def test_shipped_results(monkeypatch, tmp_path):
         assert len(store.ids()) == size_of(plan)
         learned = (run for run in map(store.run, store.ids()) if run.rewards)
         assert next(learned).is_downsampled
-    with pytest.raises(CoarticError, match="of suite 'quick' are shipped; those of comparison, "):
+    with pytest.raises(
+        CoarticError, match="suite 'quick' has no shipped results; the suites comparison, "
+    ):
         shipped.open_shipped("quick")
     copy = shutil.copytree(shipped.SHIPPED_FOLDER, tmp_path / "copy")
     monkeypatch.setattr(shipped, "SHIPPED_FOLDER", copy)

@@ -339,7 +339,7 @@ def test_run_without_any_completed_trial():
     assert "all 20 trials" in run.reason
     assert run.reward is run.hands is run.replay_reward is run.initial_reward is None
     assert run.solution == ()
-    with pytest.raises(CoarticError, match="nothing to execute"):
+    with pytest.raises(CoarticError, match="the run has no learned solution to execute"):
         run.execute()
 
 
@@ -359,7 +359,7 @@ LEFT_FIRST = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"
 @pytest.mark.parametrize(
     ("error", "words", "options"),
     [
-        (CoarticError, "unknown exploration condition 'EC5'; did you mean", {"condition": "EC5"}),
+        (CoarticError, "condition 'EC5' is unknown; did you mean", {"condition": "EC5"}),
         (CoarticError, "only the right hand, .* starts with LRLR", {"task": LEFT_FIRST}),
         (CoarticError, "movements for goals", {"start": movements_of("R", [ZERO])}),
         (CoarticError, "the first .* left",

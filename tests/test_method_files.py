@@ -37,7 +37,7 @@ def test_a_file_brings_a_method(coartic, tmp_path):
     assert coartic(*again, *own)[1].endswith("again: none with another result.\n")
     code, _, error = coartic(*again)
     assert code == 2
-    assert "unknown method 'nearest-hand': pass --method-file" in error
+    assert "method 'nearest-hand' is unknown here: pass the file that defines it" in error
 
 
 @pytest.mark.process

@@ -120,9 +120,9 @@ def test_equals_every_step_where_positions_are_rounded_most(angle, radius, step)
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"target": np.full(10, np.nan)}, "not finite"),
-        ({"target": np.full(10, 1e17)}, "a number beyond ±100000"),
-        ({"goal": (np.nan, 1.0)}, r"goal \[nan, 1.0\] is not finite"),
+        ({"target": np.full(10, np.nan)}, "all entries must be finite"),
+        ({"target": np.full(10, 1e17)}, "all entries must be from -100000 to 100000"),
+        ({"goal": (np.nan, 1.0)}, r"goal is \[nan, 1.0\]; all entries must be finite"),
         ({"radius": np.nan}, "radius is nan"),
     ],
 )

@@ -133,10 +133,10 @@ def test_whole_turns_of_recorded_angles_change_nothing(turns, people):
 
 def test_hits_beyond_two_radii_are_said_and_more_than_half_of_them_refused(people):
     odd = people.assign(left_1=people.left_1 + 3.0, right_1=people.right_1 + 3.0)
-    with pytest.warns(UserWarning, match="10 of 20 hits of b are more than 2 radii off") as warned:
+    with pytest.warns(UserWarning, match="10 of 20 hits of b are more than 2 radii from") as warned:
         check_hits(pd.concat([odd[:10], people[10:]]), BOTH)
     assert len(warned) == 1
-    with pytest.raises(CoarticError, match="11 of 20 hits of b are more than 2 radii off"):
+    with pytest.raises(CoarticError, match="11 of 20 hits of b are more than 2 radii from"):
         check_hits(pd.concat([odd[:11], people[11:]]), BOTH)
 
 
@@ -173,5 +173,5 @@ def test_solutions_have_the_recorded_postures_and_ticks(people):
         found.configurations.reshape(-1, len(JOINTS)), whole[JOINTS], atol=1e-9
     )
     assert [t for run in found.runs for t in run.ticks_by_goal()] == whole.ticks.tolist()
-    with pytest.raises(CoarticError, match="no trial hits all goals"):
+    with pytest.raises(CoarticError, match="the frame has no trial with hits of all"):
         solutions_of(BOTH, people[people.goal > 1])

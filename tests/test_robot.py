@@ -61,5 +61,5 @@ def test_names_and_shapes():
         *("base_x", "base_y", "left_1"),
         *(f"right_{k}" for k in range(1, 5)),
     )
-    with pytest.raises(ValueError, match=r"shape \(9,\).*needs \(\.\.\., 10\)"):
+    with pytest.raises(ValueError, match=r"shape \(9,\); it must be \(\.\.\., 10\)"):
         PAPER_ROBOT.forward_kinematics(np.zeros(9), "left")

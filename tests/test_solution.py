@@ -71,9 +71,15 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
             "goal 1: a target moves the base in y, which is locked, by 1: entry 1 must be 0",
         ),
         (planned(posture(1.0), posture(2.0), hand="left"), "has no left hand"),
-        ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
-        ([Movement(1, "right", "path")], "a path needs waypoints"),
-        ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "or its last waypoint"),
+        (
+            [Movement(1, "right", "planned"), *planned(posture(1.0))],
+            "target of a planned movement is None; it must be",
+        ),
+        ([Movement(1, "right", "path")], "waypoints of a path are None; they must be a list"),
+        (
+            [Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)],
+            "it must be None or the last waypoint",
+        ),
     ],
 )
 def test_solutions_that_break_the_rules(movements, words):
@@ -103,7 +109,9 @@ def test_a_base_that_a_solver_moves_a_little_is_held():
 
 def test_a_goal_is_hit_by_one_hand():
     both = [Movement(1, hand, "planned", np.zeros(10)) for hand in ("left", "right")]
-    with pytest.raises(CoarticError, match="goal 1: movements have different hands"):
+    with pytest.raises(
+        CoarticError, match="goal 1: the movements have the hands left and right; all"
+    ):
         execute(tiny_task(), both)
 
 

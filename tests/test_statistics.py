@@ -163,7 +163,7 @@ def test_without_spread_it_is_an_exact_test():
 
 @pytest.mark.parametrize("values", [[], [[1.0]], [1.0, math.nan], [math.inf]])
 def test_samples_are_vectors_of_finite_numbers(values):
-    with pytest.raises(ValueError, match="the sample is empty|a sample must"):
+    with pytest.raises(ValueError, match="the sample (is|has) .*; it must"):
         statistics.mean(values)
 
 

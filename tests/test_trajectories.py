@@ -55,5 +55,5 @@ def test_a_trajectory_where_the_hand_is_in_the_goal_has_no_row(tmp_path):
     idle = trajectory(tiny_task(goals=[[4.5, 0.1]]), [Movement(1, "right", "corrective")])
     assert (idle.configurations.shape, idle.hits.tolist()) == ((0, 10), [0])
     moved = trajectory(TASK, corrective_trial(TASK, "RR").movements)
-    with pytest.raises(CoarticError, match="no movement to draw"):
+    with pytest.raises(CoarticError, match="the film has no movement to draw"):
         write_film([("Idle", idle), ("Moved", moved)], tmp_path / "both.gif")

@@ -1,8 +1,8 @@
-"""Figures of your own, which look like the figures of the report.
+"""Draw figures of your own in the style of the figures of the report.
 
-:func:`panels`, :func:`means` and :func:`dots` draw in a function with the decorator ``styled``;
-:func:`picture` returns the bytes of a file. ``coartic.analysis.FIGURES["ranking"](study)`` draws a
-figure of the report.
+Write a function that calls :func:`panels`, :func:`means` or :func:`dots` and returns a Matplotlib
+figure, and decorate it with ``styled``. :func:`picture` turns the figure into the bytes of a file.
+``coartic.analysis.FIGURES["ranking"](study)`` draws a figure of the report.
 """
 
 from coartic.analysis.figures.plot import Plot, picture

@@ -1,4 +1,4 @@
-"""Figures of the report: functions of a study, by id in :data:`FIGURES`."""
+"""Draw the figures of the report, which :data:`FIGURES` lists by their ids."""
 
 from __future__ import annotations
 
@@ -75,21 +75,21 @@ from coartic.tasks.task import shipped_tasks
 
 @figure("Gap to the best reward", "Ticks of the mean beyond the {reference}, in per cent of it")
 def draw_ranking(study: Study) -> Parts | None:
-    """Draw the gap of each ranked method, or of each value of the parameters that a study varies.
+    """Draw the gap of each ranked method, or of each value of varied parameters.
 
-    Returns None if no method has a gap. If fewer than two settings have a gap, the gaps of ranked
-    methods are drawn.
+    If a study varies parameters, but their values cannot be compared, the gaps of ranked methods
+    are drawn. The result is None if no method is ranked.
     """
     return _draw_parameters(study) or _draw_gaps(study)
 
 
 def _draw_parameters(study: Study) -> Parts | None:
-    """Draw gaps by the values of the parameters that the study varies, a panel for each parameter.
+    """Draw the gap of each value of each varied parameter, a panel for each.
 
-    A panel has the means of table ``parameters``. If several parameters vary, it also has the gaps
-    at the best setting of the others; if only one varies, the gaps on each task. The values of an
-    axis are to scale if they are numbers, on a logarithmic axis if they span a factor of ten.
-    Returns None if no values can be compared.
+    A panel has the means of table ``parameters``. If several parameters vary, a panel also has the
+    gaps at the best values of the other parameters. If only one parameter varies, the panel also
+    has the gaps on each task. Numeric values are drawn to scale, on a logarithmic axis if they span
+    at least a factor of ten. The result is None if no values can be compared.
     """
     rows, tasks, values = list_parameters(study), ranked_tasks(study), values_of_parameters(study)
     if not len(rows):
@@ -153,9 +153,10 @@ def _draw_parameters(study: Study) -> Parts | None:
 
 
 def _places_of(values: Sequence[Any]) -> tuple[np.ndarray[Any, Any], bool]:
-    """Return where values of a parameter stand on an axis, and whether the axis is logarithmic.
+    """Return the positions of a parameter's values on an axis, and whether it is logarithmic.
 
-    Numbers have their place if they stand far enough apart; other values are equally far apart.
+    Numbers are at their values, if these are so far apart that the labels do not overlap. Any other
+    values are spaced evenly. The positions have shape ``(values,)``.
     """
     places = np.arange(len(values), dtype=np.float64)
     if not are_numbers(values):
@@ -169,7 +170,10 @@ def _places_of(values: Sequence[Any]) -> tuple[np.ndarray[Any, Any], bool]:
 
 
 def _name_lines(axes: Axes, x: float, ends: Mapping[str, float]) -> None:
-    """Write names at the right of lines that end at ``x`` and these heights, without overlap."""
+    """Write the names of lines to the right of their ends, without overlap.
+
+    All lines end at ``x``. ``ends`` maps the name of each line to its y coordinate there.
+    """
     low, high = axes.get_ylim()
     least, last = 0.075 * (high - min(low, 0.0)), -math.inf
     for name, height in sorted(ends.items(), key=lambda item: item[1]):
@@ -179,15 +183,15 @@ def _name_lines(axes: Axes, x: float, ends: Mapping[str, float]) -> None:
 
 
 _FEW: Any = {"markersize": 3, "alpha": 0.6}
-"""Look of single runs."""
+"""Look of points that stand for single runs: arguments of Matplotlib's ``plot``."""
 
 
 def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
-    """Return the gaps (%) of runs that are too few for an interval.
+    """Return the gaps of a method's runs if they are too few for an interval.
 
-    The runs are those of a ranked method. A gap is a mean over tasks of the runs with the same
-    number. The list is empty if the runs
-    are enough for an interval, or there is only one run.
+    Gaps are in per cent. ``row`` is the method's row of :func:`.standings`. Each gap is the mean
+    over tasks of the runs with the same number. The list is empty if there are enough runs for an
+    interval, or only one run on a task.
     """
     runs = runs_on(study, str(row["method"]), ranked_tasks(study))
     gaps = 100 * runs.groupby("run").gap.mean()
@@ -197,7 +201,8 @@ def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
 def _draw_gaps(study: Study) -> Parts | None:
     """Draw the gap of each ranked method, a mean over tasks, with its interval.
 
-    Settings of methods that are drawn are left out. Returns None if no method is ranked.
+    Settings and ablations of methods that are drawn are left out. The result is None if no method
+    is ranked.
     """
     rows, tasks = standings(study).query("why == ''"), ranked_tasks(study)
     rows = without_settings(rows).reset_index(names="method")
@@ -269,7 +274,7 @@ def _draw_gaps(study: Study) -> Parts | None:
 
 
 def _width_of(shape: tuple[int, int]) -> float:
-    """Return the usual width of a figure with these rows and columns of panels, inches."""
+    """Return the usual width (inches) of a figure with these rows and columns of panels."""
     return style.TWO if shape[1] > 1 else style.ONE
 
 
@@ -285,12 +290,19 @@ ALONE = KNOWN_METHODS["corrective-alone/given"].facts.algorithm
     "n = {n} runs.",
 )
 def draw_saved(study: Study) -> Parts | None:
-    """Draw how many ticks more than the corrective process methods take for each goal, and in sum.
+    """Draw how many more ticks than the corrective process methods take for each goal.
 
-    There is a panel for each task, and a row for each of these methods: the learner that explores
-    most, random search, the best method of each kind that uses the reward, and methods from files.
-    All panels have the same order: methods on most tasks first, then those with the smallest mean
-    gap. Returns None if there is nothing to draw.
+    The sum over goals is drawn, too. There is a panel for each task, and a row for each of these
+    methods:
+
+    - the learner under the condition that explores most;
+    - random search;
+    - the best method that uses the reward of each trial, and the best method that uses the reward
+      as a formula;
+    - methods from files.
+
+    All panels have the same order: first the methods that were run on the most tasks, and among
+    these the methods with the smallest mean gap. The result is None if there is nothing to draw.
     """
     rows, methods = list_saved(study), study.methods
     single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
@@ -360,10 +372,10 @@ def draw_saved(study: Study) -> Parts | None:
     "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
-    """Draw the postures of a method at the goal of :func:`shared_goal` on both tasks.
+    """Draw the postures of a method at a goal that two tasks share (:func:`.shared_goal`).
 
-    If the method has random search as its control, its postures are drawn as well. Returns None if
-    there is no shared goal.
+    If the study has random search that is the control of the method, the postures of random search
+    have a second panel. The result is None if there is no shared goal.
     """
     shared = shared_goal(study)
     if shared is None:
@@ -399,7 +411,8 @@ DOTS = {
     "lean_base": "base\n(share of its way)",
     "lean_joints": "joints\n(share of their way)",
 }
-"""Panels of the dot plot by column of :func:`list_contexts`, with the labels of their axes."""
+"""Maps the column of :func:`list_contexts` that each panel of the dot plot shows to the label of
+the panel's axis."""
 
 
 @figure(
@@ -411,11 +424,12 @@ DOTS = {
     f"{style.COVERAGE} bootstrap intervals over runs, if there are five runs.",
 )
 def draw_shared_goal(study: Study) -> Parts | None:
-    """Draw the posture difference and the lean of each method at the goal of :func:`shared_goal`.
+    """Draw the posture difference and the lean of each method at a shared goal.
 
-    Each has a panel, and so have the leans of the base and of the joints alone. Settings of methods
-    that are drawn are left out. Random search, if there is one, is also a vertical line. Returns
-    None if there is no shared goal.
+    The goal is that of :func:`.shared_goal`. The four panels show the posture difference, the lean,
+    the lean of the base alone, and the lean of the joints alone. A vertical line shows the value of
+    random search, if the study has it. Settings and ablations of methods that are drawn are left
+    out. The result is None if there is no shared goal.
     """
     shared = shared_goal(study)
     if shared is None:
@@ -453,8 +467,9 @@ def draw_shared_goal(study: Study) -> Parts | None:
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
     """Draw the postures of runs at a shared goal, and their mean on each task.
 
-    Returns a frame for each task, with a row for each run: ``task``, ``method``, ``goal``, ``hand``
-    and a column for each coordinate of the posture.
+    The result is a list with a frame for each task. A frame has a row for each run: ``task``,
+    ``method``, ``goal``, ``hand``, and a column for each coordinate of the posture (length units
+    and rad).
     """
     axes.set_axis_off()
     axes.set_aspect("equal")
@@ -503,7 +518,7 @@ def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
 
 
 PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
-"""Costs that have a panel in the figure, with the labels of their axes."""
+"""Maps each cost that has a panel in the figure to the label of the panel's axis."""
 
 
 @figure(
@@ -516,15 +531,16 @@ PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluati
 def draw_runtimes(study: Study) -> Parts | None:
     """Draw the share of targets that methods reach within a budget.
 
-    Budgets are numbers of trials and of forward-kinematics evaluations, each in its own panel. A
-    panel without a curve is left out. Returns None if there is no curve.
+    Curves are ECDFs of running times (:func:`.runtimes`). One panel has numbers of trials as
+    budgets, and the other panel has numbers of forward-kinematics evaluations. A panel without a
+    curve is left out. The result is None if there is no curve.
 
-    The curves are those of :func:`.headline_methods`, without the corrective process alone. Shown
-    are
+    Among the methods that represent their algorithms (:func:`.headline_methods`), except the
+    corrective process alone, these have a curve:
 
     - all methods that use the reward of each trial;
     - all methods from files;
-    - the one other method that reaches most targets.
+    - among all other methods, the one that reaches the most targets.
     """
     if not len(tabled := list_runtimes(study)):
         return None
@@ -603,7 +619,8 @@ def draw_runtimes(study: Study) -> Parts | None:
 
 
 CURVES = (*LEARNERS, RANDOM_SEARCH, "hill-climbing", "cma-es/bandit")
-"""Built-in methods with learning curves. All methods from files with trials also have them."""
+"""Ids of the built-in methods that have learning curves. Methods from files that make trials have
+learning curves, too."""
 
 
 @figure(
@@ -611,11 +628,11 @@ CURVES = (*LEARNERS, RANDOM_SEARCH, "hill-climbing", "cma-es/bandit")
     "Mean over runs (band: quartiles) of",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
-    """Draw the best reward so far against the trial, a panel for each task.
+    """Draw the best reward so far against the trial, in a panel for each task.
 
-    Curves are those of :func:`learning_curves`. In a world with noise, where the best trial is
-    partly luck, they show the mean reward of the trials in each tenth of practice instead
-    (:func:`practice_curves`). Returns None if there is no curve.
+    The curves are those of :func:`learning_curves`. In a world with noise, where the best trial is
+    partly luck, the curves show instead the mean reward of the trials in each tenth of practice
+    (:func:`practice_curves`). The result is None if there is no curve.
     """
     if study.is_noisy:
         data, shown = practice_curves(study), "mean"
@@ -677,11 +694,12 @@ def draw_learning_curves(study: Study) -> Parts | None:
 
 
 def learning_curves(study: Study) -> pd.DataFrame:
-    """Return the best reward so far, negative ticks, by task, method and number of trials.
+    """Return the learning curve of each method on each individual task, as means over runs.
 
-    Only solved runs on individual tasks with rewards of trials count. Methods are the
-    :func:`.headline_methods` among :data:`CURVES` and methods from files. EC1 has a curve only on
-    tasks without such runs of EC2 to EC4.
+    A learning curve is the best reward so far as a function of the number of trials. Only solved
+    runs whose rewards of trials are stored count. The methods are the :func:`.headline_methods`
+    among :data:`CURVES` and methods from files. EC1 has a curve only on tasks on which EC2, EC3 and
+    EC4 have none of these runs.
 
     Returns
     -------
@@ -689,9 +707,11 @@ def learning_curves(study: Study) -> pd.DataFrame:
         If there are no curves, it is empty and has no columns. Otherwise its columns are
 
         - ``task``, ``method`` (label), and ``runs`` (number of runs);
-        - ``trial``: at most 120 numbers, from 1 to the trials of the shortest run;
-        - ``best``: mean over runs, NaN until all runs have a solution;
-        - ``best_low`` and ``best_high``: quartiles.
+        - ``trial``: number of trials. There are at most 100 numbers, logarithmically spaced from 1
+          to the number of trials of the shortest run;
+        - ``best``: mean over runs of the best reward so far, in negative ticks. It is NaN until all
+          runs have a solution;
+        - ``best_low`` and ``best_high``: lower and upper quartile over runs.
     """
     learned, curves = improvements(study), [pd.DataFrame()]
     for task, label, runs in _runs_with_curves(study, learned):
@@ -708,9 +728,9 @@ def learning_curves(study: Study) -> pd.DataFrame:
 
 
 def practice_curves(study: Study) -> pd.DataFrame:
-    """Return the mean rewards of trials in each tenth of practice in a world with noise.
+    """Return the mean reward of trials in each tenth of practice, in a noisy world.
 
-    Runs and methods are those of :func:`learning_curves`. Failed trials have no reward.
+    Methods and tasks are chosen as in :func:`learning_curves`. Failed trials do not count.
 
     Returns
     -------
@@ -718,10 +738,10 @@ def practice_curves(study: Study) -> pd.DataFrame:
         If there are no curves, it is empty and has no columns. Otherwise its columns are
 
         - ``task``, ``method`` (label), and ``runs`` (number of runs);
-        - ``trial``: the middle of each tenth of the shortest run;
-        - ``mean``: mean over runs of the mean reward in the tenth, in negative ticks, NaN if a run
-          completed no trial in it;
-        - ``mean_low`` and ``mean_high``: quartiles.
+        - ``trial``: number of the trial in the middle of each tenth, for the shortest run;
+        - ``mean``: mean over runs of the mean reward in the tenth, in negative ticks. It is NaN if
+          a run completed no trial in this tenth;
+        - ``mean_low`` and ``mean_high``: lower and upper quartile over runs.
     """
     practised, curves = study.runs[study.runs.practice.notna()], [pd.DataFrame()]
     for task, label, runs in _runs_with_curves(study, practised.run_id):
@@ -737,9 +757,9 @@ def practice_curves(study: Study) -> pd.DataFrame:
 def _runs_with_curves(
     study: Study, run_ids: Collection[str]
 ) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """Yield task, label and solved runs of each curve (:func:`learning_curves`).
+    """Yield the task, the method's label, and the solved runs of each learning curve.
 
-    Only the runs in ``run_ids`` count.
+    Only runs whose ids are in ``run_ids`` count (:func:`learning_curves`).
     """
     cells = {
         (task, label): runs
@@ -764,9 +784,9 @@ def _runs_with_curves(
 def draw_gaps_by_family(study: Study) -> Parts | None:
     """Draw the gap to the best known reward of each instance, by family and method.
 
-    There is a panel for each family and a row for each method. A dot is the mean over runs on an
-    instance that the method solved in all runs. Settings of methods that are drawn are left out.
-    Returns None if there is nothing to draw.
+    There is a panel for each family, and a row for each method. A dot is the mean over runs on an
+    instance on which all runs of the method are solved. Settings and ablations of methods that are
+    drawn are left out. The result is None if there is nothing to draw.
     """
     runs, rows = instance_runs(study), study.methods
     methods = without_settings(rows[rows.index.isin(runs.method)])
@@ -831,7 +851,7 @@ _DISC_LOOK: Any = {
 def draw_tasks(study: Study) -> Parts | None:
     """Draw the start configuration and the goals of each individual task, a panel for each.
 
-    Returns None if there are no individual tasks.
+    The result is None if the study has no individual tasks.
     """
     shown = list(study.individual_tasks.values())
     if not shown:
@@ -853,7 +873,7 @@ def draw_tasks(study: Study) -> Parts | None:
 
 @style.styled
 def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
-    """Return a figure with the start configuration and the goals of tasks, a panel for each."""
+    """Return a figure of tasks: the start configuration and the goals of each."""
     tasks = titled_apart(tasks)
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
@@ -900,10 +920,10 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
 
 
 def _draw_order(axes: Axes, goals: Array, apart: float) -> None:
-    """Draw the goals of a task as numbered discs, and an arrow from each goal to the next.
+    """Draw goals as numbered discs, and an arrow from each goal to the next.
 
-    ``goals`` has shape (G, 2). Discs that would be nearer than ``apart`` (in length units) are
-    moved away from each other.
+    ``goals`` has the centres of the goals in length units, shape ``(G, 2)``. Discs whose distance
+    would be below ``apart``, in length units, are moved away from each other.
     """
     places = goals.copy()
     for _ in range(100):

@@ -1,4 +1,4 @@
-"""Make figures with their words and numbers, and write them to files."""
+"""Make figures of the report with their captions and numbers, and write them to files."""
 
 from __future__ import annotations
 
@@ -40,22 +40,30 @@ _NO_DATE = {"SOURCE_DATE_EPOCH": "0"}  # replaces the user's value, so that no d
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure with its words and numbers."""
+    """A figure with its title, caption, alternative text and numbers."""
 
     id: str
-    """Name of the figure's files without suffix."""
+    """Id of the figure. It is the name of the figure's files, without suffix."""
     title: str
     caption: str
     alt: str
     """Alternative text: a description for people who cannot see the figure."""
     figure: Figure
     data: pd.DataFrame
-    """The numbers that are drawn, as a tidy frame."""
+    """The numbers that the figure shows, as a tidy frame."""
 
     def save(self, path: str | Path) -> None:
-        """Write the picture into a file ``.svg``, ``.pdf`` or ``.png``, or replace the file.
+        """Write the figure into a file, which is replaced if it exists.
 
-        Raises CoarticError for another suffix, and if the file cannot be written.
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            Name of the file. Its suffix decides the format: ``.svg``, ``.pdf`` or ``.png``.
+
+        Raises
+        ------
+        CoarticError
+            The suffix is another one, or the file cannot be written.
         """
         path = Path(path)
         with describe_os_errors(path):
@@ -68,34 +76,44 @@ class Plot:
 
 
 Parts = tuple[Figure, pd.DataFrame, str, str]
-"""Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and sentences for the
-end of the caption that depend on the study."""
+"""What a drawing function returns: the figure, its numbers, its alternative text, and sentences
+that depend on the study and are added at the end of the caption."""
 DrawsFigure = Callable[..., Plot | None]
-"""Function of a study that draws a figure of the report, or returns None if the folder has no runs
-for it.
+"""Function that draws a figure of the report.
 
-Further arguments: ``width`` in inches, such as 3.4, 5.5 or 7.2; ``style``: settings of Matplotlib,
-as ``matplotlib.style.use`` accepts them, that override the project's.
+Its argument is a study of one world. It returns a :class:`Plot`, or None if the study has no runs
+for this figure. Optional arguments are ``width``, the width of the figure in inches, such as 3.4,
+5.5 or 7.2; and ``style``, settings of Matplotlib that override those of the project, in any form
+that ``matplotlib.style.use`` accepts.
 """
 
 
 FIGURES: dict[str, DrawsFigure] = {}
-"""Figures by id, in the order of :mod:`coartic.analysis.figures.drawings`."""
+"""Maps the id of each figure to the function that draws it, in the order of
+:mod:`coartic.analysis.figures.drawings`."""
 
 
 def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:
     """Return a decorator that makes a figure of the report from a drawing function.
 
-    The decorator enters the figure in :data:`FIGURES`.
+    The decorator adds the function to :data:`FIGURES`. The figure has
 
-    - The figure has the style of all figures.
-    - Its id is the part of the function's name after the first underscore, with dashes for
-      underscores, and :func:`.ending_of` in another world than the paper's, which its title names.
-    - The caption is followed by the sentences that the function returns, and by an explanation of
-      the dagger if one is drawn.
-    - In the caption ``{n}`` stands for the range of column ``runs`` of the drawn numbers (empty if
-      there is no such column), and ``{reference}`` for the name of the rewards from which gaps are
-      measured.
+    - the style of all figures;
+    - an id: the name of the drawing function after its first underscore, with dashes instead of
+      underscores. In another world than the paper's, the suffix of the world follows
+      (:func:`.ending_of`);
+    - a title, followed by the name of the world if it is not the paper's;
+    - a caption, followed by the sentences that the drawing function returns, and by an explanation
+      of the dagger if the figure has one.
+
+    Parameters
+    ----------
+    title : str
+        Title of the figure.
+    caption : str
+        Beginning of the caption. ``{n}`` stands for the smallest and the largest number in column
+        ``runs`` of the figure's numbers (empty if there is no such column), and ``{reference}`` for
+        the name of the rewards from which gaps are measured (:func:`.reference`).
     """
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:
@@ -125,10 +143,11 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
 
 
 def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
-    """Return the looks of the lines and markers of methods, by label.
+    """Return a dict that maps each label to the look of its line and markers.
 
-    They are the same in all figures of a study. Methods from a user's method file have wider lines
-    and larger markers.
+    A look is a dict of arguments of Matplotlib's ``plot``. A method has the same look in all
+    figures of a study. Methods from files have wider lines and larger markers than built-in
+    methods.
     """
     looks: dict[str, style.Look] = {}
     for label, row in study.methods.loc[[*labels]].iterrows():
@@ -145,9 +164,10 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
 def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -> str:
     """Return the name of a method (a label) for the figure that is being drawn.
 
-    It is the method's title, or its short name in a narrow figure. A name of more than ``longest``
-    letters, or of 24 in a narrow figure, has several lines. In a study that varies parameters the
-    name is their values alone, because all settings are of one method.
+    The name is the title of the method, or its short title in a narrow figure. It is broken into
+    lines of at most ``longest`` characters, or 24 characters in a narrow figure. In a study that
+    varies parameters, the name has only the values of the parameters, because all settings are of
+    the same method.
     """
     if method in study.varied.index:
         row = study.methods.loc[method]
@@ -165,36 +185,52 @@ def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -
 
 
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
-    """Return rows in words, for an alternative text.
+    """Describe the rows of a frame in words, for an alternative text.
 
-    The template is filled in for each row, and the results are joined by ``; ``. Names in ``{}``
-    are columns; ``{title}`` is the title of the method whose label is in column ``method``.
+    The template is filled in for each row, and the results are joined by semicolons. A name in
+    braces stands for the value of this column; ``{title}`` stands for the title of the method whose
+    label is in column ``method``.
     """
     rows = rows.assign(title=rows.method.map(study.methods.title))
     return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
 
 
 def picture(drawing: Figure, ending: str) -> bytes:
-    """Return a figure as the bytes of a file with this suffix, one of :data:`FORMATS`.
+    """Return a figure as the bytes of a picture file.
 
-    With the same fonts and the same version of Matplotlib, the same figure gives the same bytes:
-    ids in SVG are not random, and no date is written. SVG and PDF files name the version. Raises
-    CoarticError for another suffix.
+    The same figure gives the same bytes with the same fonts and the same version of Matplotlib: ids
+    in SVG are not random, and no date is written. SVG and PDF files name the version of Matplotlib.
+
+    Parameters
+    ----------
+    drawing : matplotlib.figure.Figure
+        The figure.
+    ending : {".svg", ".pdf", ".png"}
+        Suffix of the file, which decides the format.
+
+    Returns
+    -------
+    bytes
+        Content of the file.
+
+    Raises
+    ------
+    CoarticError
+        ``ending`` is another suffix.
     """
     if ending not in FORMATS:
         raise CoarticError(
-            f"the name of a picture must end in one of {', '.join(FORMATS)}, not in "
-            f"{brief_value(ending)}"
+            f"suffix of a picture is {brief_value(ending)}; it must be one of {', '.join(FORMATS)}"
         )
     dated = {".pdf": "CreationDate", ".svg": "Date", ".png": "Software"}[ending]
     return _saved(drawing, style.RC, format=ending[1:], dpi=300, metadata={dated: None})
 
 
 def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
-    """Return a figure as the bytes of a file, and keep its layout engine.
+    """Return a figure as the bytes of a file, without changing its layout engine.
 
-    ``settings`` are rcParams of Matplotlib; ``how`` are arguments of ``Figure.savefig``. Parts of
-    the figure are laid out only once.
+    ``settings`` are rcParams of Matplotlib, and ``how`` are arguments of ``Figure.savefig``. The
+    layout engine arranges the parts of the figure once, before the figure is written.
     """
     stream, layout, dpi = io.BytesIO(), drawing.get_layout_engine(), drawing.dpi
     canvas = drawing.canvas
@@ -215,13 +251,13 @@ def for_page(plot: Plot) -> str:
     """Return a figure as one ``<svg>`` element for a page of HTML.
 
     - The element scales with its container and has a transparent background.
-    - Ink is the page's ``currentColor``. Open markers are filled with the custom property
-      ``--paper``, if the page has it. Grey is ``--grey``, blue ``--blue``, and colours of methods
-      have their names.
-    - Marks with a :func:`~.style.tip` show its text.
-    - Ids begin with the plot's id, so that a page can have several figures. The id of the whole
-      drawing ends in ``-drawing``.
-    - Each ``style`` attribute becomes a class, named by a hash of the style.
+    - Black is replaced by the page's ``currentColor``, so that a dark page can have light ink.
+    - Other colours are custom properties of CSS, which the page can define: ``--paper`` for the
+      inside of open markers, ``--grey``, ``--blue``, and the names of the colours of methods.
+    - A mark with a :func:`~.style.tip` shows the text of the tip.
+    - All ids begin with the id of the plot, so that a page can have several figures. The id of the
+      whole drawing ends in ``-drawing``.
+    - Each ``style`` attribute is replaced by a class, whose name is a hash of the style.
     """
 
     def shorten(attribute: re.Match[str]) -> str:  # lengths to tenths of a point
@@ -266,7 +302,9 @@ def for_page(plot: Plot) -> str:
 
 
 def _with_short_lines(path: str) -> str:
-    """Return a path of SVG whose points have at most one decimal, its lines as differences.
+    """Return an SVG path with relative instead of absolute coordinates of its lines.
+
+    The coordinates of the path must have at most one decimal.
 
     Examples
     --------
@@ -284,10 +322,11 @@ def _with_short_lines(path: str) -> str:
 
 
 def panels_for_page(plot: Plot) -> list[str]:
-    """Return the panels and legends of a figure as ``<svg>`` elements, for a narrow page.
+    """Return each panel and legend of a figure as ``<svg>``, for a narrow page.
 
-    They show parts of :func:`for_page`, which must be on the page, and be called before. The list
-    is empty if there is only one panel, or a panel lacks the names of its rows.
+    The elements refer to parts of the element that :func:`for_page` returns. Call that function
+    first, and put its element on the same page. The list is empty if the figure has only one panel,
+    or if a panel does not show the names of its rows.
     """
     drawing, canvas = plot.figure, plot.figure.canvas
     panels = [axes for axes in drawing.axes if axes.has_data()]

@@ -37,25 +37,27 @@ TALLEST = 225 / INCH
 """Largest height (in inches) of a figure that leaves room for a caption on the page."""
 _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
-"""Settings of Matplotlib for all figures."""
+"""Settings of Matplotlib (rcParams) for all figures."""
 MIN_PANEL, MIN_SMALL_PANEL, MIN_DOTS = 2.2, 1.6, 0.8
-"""Smallest widths (in inches) of panels side by side, if the width of a figure is set: of panels
-with names next to them, of panels without names, and of the panels of a dot plot, which share
-their names."""
+"""Smallest widths, in inches, of panels that are side by side in a figure whose width is set. They
+are for panels with names to their left, for panels without names, and for the panels of a dot plot,
+which share the names of rows."""
 _width: ContextVar[float | None] = ContextVar("width", default=None)
 COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Coverage of all intervals, for captions."""
 BACKGROUND = "#ffffff"
 TIP = "tip:"
-"""Prefix of the id of a mark with a :func:`tip`."""
+"""Prefix of the id of a mark that has a :func:`tip`."""
 BLUE, SKY, GREEN, ORANGE = "#0072b2", "#56b4e9", "#009e73", "#e69f00"
 VERMILLION, PURPLE, GREY, INK = COLORS["rust"], "#cc79a7", "#6b6b6b", COLORS["ink"]
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
 OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": (0, (1, 1.2))}
 INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": (0, (5, 1.2, 1, 1.2))}
-"""Looks of the lines at the optimum, and at the reward of the corrective process alone."""
+"""Looks of the line at the best known reward, and of the line at the reward of the corrective
+process alone: arguments of Matplotlib."""
 styled = style.context(["default", RC])
-"""Decorator that draws in this style, with Matplotlib's defaults instead of the user's settings."""
+"""Decorator of a drawing function: it applies this style, and Matplotlib's defaults instead of the
+user's settings."""
 
 
 Look = dict[str, Any]
@@ -63,7 +65,7 @@ Look = dict[str, Any]
 
 
 def look_of(method: str) -> Look:
-    """Return the colour, the marker and the line style of a built-in method in all figures.
+    """Return the colour, the marker and the line style of a built-in method.
 
     Parameters
     ----------
@@ -73,16 +75,27 @@ def look_of(method: str) -> Look:
     Returns
     -------
     dict
-        ``color``, ``marker`` and ``linestyle``, arguments of Matplotlib's ``plot``.
+        ``color``, ``marker`` and ``linestyle``: arguments of Matplotlib's ``plot``.
+
+    Raises
+    ------
+    KeyError
+        ``method`` is another id.
+
+    Examples
+    --------
+    >>> look = look_of("cma-es/bandit")
+    >>> look["color"], look["marker"]
+    ('#007c52', '^')
     """
     color, mark = LOOKS[method]
     return {"color": COLORS[color], "marker": MARKS[mark][0], "linestyle": MARKS[mark][1]}
 
 
 def grid(panels: int) -> tuple[int, int]:
-    """Return the numbers of rows and columns for a number of panels.
+    """Return the numbers of rows and columns in which a number of panels is arranged.
 
-    There are two columns for up to six panels, three for more, and one for a single panel.
+    A single panel has one column, two to six panels have two columns, and more have three.
     """
     columns = min(2 if panels <= 6 else 3, panels)
     return -(-panels // columns), columns
@@ -92,7 +105,7 @@ def grid(panels: int) -> tuple[int, int]:
 def drawn_at(width: float | None) -> Iterator[None]:
     """Set the width (in inches) of the figures that :func:`panels` makes in a ``with`` block.
 
-    With None, figures have the width in argument ``size`` of :func:`panels`.
+    If ``width`` is None, each figure has the width that is passed to :func:`panels` as ``size``.
     """
     before = _width.set(width)
     try:
@@ -102,7 +115,7 @@ def drawn_at(width: float | None) -> Iterator[None]:
 
 
 def is_narrow() -> bool:
-    """Return True if :func:`drawn_at` has set a width below five inches."""
+    """Return True if figures are drawn with a width below five inches (:func:`drawn_at`)."""
     return (_width.get() or TWO) < 5
 
 
@@ -116,7 +129,8 @@ def panels(
     """Return a figure with panels.
 
     If :func:`drawn_at` has set a width, the figure has this width. If panels would then be narrower
-    than ``least``, there are fewer side by side, and the height grows with the number of rows.
+    than ``least``, there are fewer columns and more rows of panels, and the height of the figure
+    grows in proportion to the number of rows.
 
     Parameters
     ----------
@@ -126,8 +140,8 @@ def panels(
         Width and height, in inches. ``ONE`` and ``TWO`` are the widths of one and two columns of a
         journal.
     used : int, optional
-        Number of panels that are used, by default all. The other panels stay empty. If a width is
-        set, only the last row has empty panels.
+        Number of panels that are used, by default all. The other panels are not drawn. If a width
+        is set, only the last row has unused panels.
     least : float
         Smallest width (in inches) of panels side by side, if a width is set.
     **subplots
@@ -151,17 +165,26 @@ def panels(
 
 
 def name_rows(axes: Axes, names: Sequence[str]) -> None:
-    """Write names to the left of rows at y = 0, -1, -2 and so on."""
+    """Write names to the left of rows at y = 0, -1, -2, ..."""
     axes.set_yticks([-place for place in range(len(names))], names)
     axes.set_ylim(-len(names) + 0.4, 0.6)
     axes.tick_params(axis="y", length=0)
 
 
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
-    """Draw a legend below all panels.
+    """Draw a legend below all panels of a figure.
 
-    The legend has ``columns`` columns, or fewer if the figure is too narrow for the entries. If the
-    legend has more than two lines, the figure becomes taller.
+    If the legend has more than two lines, the figure becomes taller.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    handles : sequence of matplotlib.artist.Artist
+        Entries of the legend: artists with labels.
+    columns : int
+        Number of columns of the legend. It is reduced if the figure is too narrow for the labels.
+    **more
+        Arguments of Matplotlib's ``Figure.legend``.
     """
     widths = [0.45 + 0.06 * len(str(handle.get_label())) for handle in handles]  # inches
     while columns > 1:
@@ -197,15 +220,17 @@ def means(
     axes : matplotlib.axes.Axes
         Axes to draw on.
     frame : DataFrame
-        A row for each mean, such as the table of :func:`coartic.analysis.means`: columns ``x`` and
-        ``y``, and for intervals the columns of ``y`` with ``_low`` and ``_high``.
+        A row for each mean, such as the table of :func:`coartic.analysis.means`. Intervals are
+        drawn if the frame has the ends of the interval of column ``y`` in columns whose names end
+        in ``_low`` and ``_high``.
     x, y : str
-        Columns of the x coordinates and of the means.
+        Names of the columns with the x coordinates and with the means.
     by : str
-        Column of groups. Each group has a line, a colour and a label; rows with NaN in this column
-        are not drawn. Empty for a single line.
+        Name of the column that says to which group a row belongs. Each group has a line, a colour
+        and a label; a row with NaN in this column is not drawn. If it is empty, all rows belong to
+        one line.
     scale : float
-        Factor of means and intervals: 100 for per cent.
+        Factor by which means and intervals are multiplied: 100 turns a fraction into per cent.
     shift : float
         Distance of each line to the right of the previous line, in units of ``x``.
     bars : float, optional
@@ -239,19 +264,28 @@ def dots(
     quantities: Mapping[str, str],
     lines: Mapping[str, float | Sequence[float]],
 ) -> Figure:
-    """Return a dot plot: a row for each name, a panel for each quantity, with intervals.
+    """Return a dot plot: a row for each name, a panel for each quantity.
 
     Parameters
     ----------
     rows : DataFrame
-        A row for each row of the plot, from top to bottom: ``name``, ``color`` and ``marker`` (of
-        Matplotlib), ``bold`` (True for a bold name), and a column for each quantity, with ``_low``
-        and ``_high`` if it has intervals. NaN stands for a missing dot or interval.
-    quantities : dict
-        For each panel, the column of the quantity and the label of its axis.
-    lines : dict
-        Values at which a panel has dashed lines, by the column of the panel: one value, or several.
-        NaN, and names that are not columns of ``quantities``, are ignored.
+        A row for each row of the plot, from top to bottom, with the columns
+
+        - ``name``: name that is written to the left of the row;
+        - ``color`` and ``marker``: of Matplotlib;
+        - ``bold``: True to write the name in bold type;
+        - a column for each quantity, and columns with the same name and ``_low`` and ``_high`` if
+          the quantity has intervals. NaN stands for a missing dot or interval.
+    quantities : mapping of str to str
+        Maps the column of each quantity to the label of the axis of its panel.
+    lines : mapping of str to float or sequence of float
+        Maps columns of quantities to the values at which their panels have dashed lines. NaN, and
+        names that are not in ``quantities``, are ignored.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
     """
     height = 0.55 + (0.135 if is_narrow() else 0.165) * len(rows)
     size = TWO, height + 0.1 * sum(name.count("\n") for name in rows.name)
@@ -279,22 +313,25 @@ def dots(
 
 
 def tip(artist: Artist, text: str) -> None:
-    """Set the text that a page of HTML shows when the pointer rests on a mark.
+    """Set the text that HTML pages show when the pointer rests on a mark.
 
-    The text replaces the mark's id (gid).
+    Matplotlib stores the text as the mark's group id (gid), which is replaced.
     """
     artist.set_gid(f"{TIP}{text}")
 
 
 def legend_line(label: str, **line: Any) -> Line2D:
-    """Return an entry for a legend: a line or mark with its label."""
+    """Return an entry for a legend: a line or marker with its label.
+
+    ``line`` has the look: arguments of Matplotlib's ``Line2D``.
+    """
     return Line2D([], [], label=label, **line)
 
 
 def log_axis(axes: Axes) -> None:
-    """Make the x axis logarithmic, with numbers at decades: 1, 100, 1k, 1M.
+    """Make the x axis logarithmic, with labels such as 1, 100, 1k and 1M.
 
-    0.1 is written 100m. Small ticks are at 2 and 5 times each decade.
+    A label of 100m stands for 0.1. Minor ticks are at 2 and 5 times each power of ten.
     """
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(EngFormatter(sep=""))
@@ -303,9 +340,10 @@ def log_axis(axes: Axes) -> None:
 
 
 def letters(panels: Iterable[Axes], pad: float | None = None) -> None:
-    """Write a, b, ... z before the titles of panels, ``pad`` points above the axes.
+    """Write the letters a, b, ... z before the titles of panels.
 
-    Panels after the 26th do not change.
+    ``pad`` is the distance of the titles from the axes, in points. Panels after the 26th get no
+    letter.
     """
     for letter, axes in zip(ascii_lowercase, panels, strict=False):
         axes.set_title(f"{letter}  {axes.get_title(loc='left')}", loc="left", pad=pad)

@@ -1,1 +1,1 @@
-"""The report of a results folder: page, tables and summary."""
+"""Make the report of a results folder: its page, tables and figures."""

@@ -1,4 +1,4 @@
-"""Write a report: the page ``report.html``, and tables and figures as files."""
+"""Write a report: the page ``report.html``, and files with its tables and figures."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from coartic.tasks.task import shipped_tasks
 
 HERE = Path(__file__).parent
 LONG = 10
-"""Most rows of a table that the page does not fold, except the ranking."""
+"""Largest number of rows of a table that the page does not fold. The ranking is never folded."""
 
 
 def write_report(
@@ -55,29 +55,36 @@ def write_report(
 ) -> tuple[list[str], dict[str, str]]:
     """Write a report into a folder, and replace an earlier report of the same results.
 
-    The page ``report.html`` and tables as CSV are always written. If the study has several worlds,
-    the page shows the first one, and each other world in a section of its own. A CSV file has the
-    rows of all worlds, with a column ``world``. A LaTeX file has a table for each world, because
-    headings and references differ. Names of figures end in their world.
+    The page ``report.html`` and all tables as CSV files are always written. If the study has
+    several worlds,
+
+    - the page shows the first world, and a section for each other world;
+    - a CSV file has the rows of all worlds, with a column ``world``;
+    - a LaTeX file has a table for each world, because headings and best known rewards differ;
+    - the name of a figure's file ends in the name of its world.
 
     Parameters
     ----------
     study : Study
+        Results of the folder, with all worlds.
     folder : pathlib.Path
+        Folder of the report. It is made if it does not exist.
     for_paper : bool
         True to also write tables as LaTeX, and figures as SVG and PDF.
     width : float, optional
         Width of the SVG and PDF figures, in inches. By default each figure has the width that it
         has in ``report.html``.
     watch : callable
-        Function that is called with the title of each section before it is made, and with ``TITLE,
-        for print`` before its figures are written to files.
+        Function for showing the progress. It is called with the title of each section before the
+        section is made, and with ``TITLE, for print`` before the figures of the section are made
+        for files.
 
     Returns
     -------
-    (list of str, dict of str to str)
-        Paths of the files relative to ``folder``, and errors of parts of the report that could not
-        be made, by the name of the part.
+    list of str
+        Paths of the written files, relative to ``folder``.
+    dict of str to str
+        Maps the name of each part of the report that could not be made to its error.
 
     Raises
     ------
@@ -138,7 +145,10 @@ def write_report(
 
 
 def _latex_of(study: Study, table: Table) -> str:
-    """Return a table of one world as LaTeX, or the empty string if it has no columns for LaTeX."""
+    """Return a table as LaTeX; the empty string if no column is for LaTeX.
+
+    The study must have one world.
+    """
     if not any(column.in_latex for column in table.columns):
         return ""
     notes = sections.notes_of(study, table(study).columns)
@@ -146,9 +156,9 @@ def _latex_of(study: Study, table: Table) -> str:
 
 
 def _files_of_figures(study: Study, section: Section, width: float | None) -> dict[str, bytes]:
-    """Return the contents of the SVG and PDF files of a section's figures by path.
+    """Return a dict that maps paths of a section's picture files to their contents.
 
-    ``width`` is in inches; None stands for the usual width of each figure.
+    ``width`` is the width of the figures in inches; None stands for the usual width of each figure.
     """
     files = {}
     drawn = (draw(study, width=width) for draw in section.figures)
@@ -162,23 +172,27 @@ def _files_of_figures(study: Study, section: Section, width: float | None) -> di
 def _rows_shown(study: Study, table: Table) -> pd.DataFrame:
     """Return the rows of a table that page and LaTeX show.
 
-    Settings and ablations (:func:`.is_setting`) are left out, unless the table has
-    ``with_settings``.
+    Settings and ablations of other methods in the table (:func:`.is_setting`) are left out, unless
+    ``table.with_settings`` is True.
     """
     frame = table(study)
     return frame if table.with_settings else frame[~is_setting(study, frame)]
 
 
 def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str, Any]:
-    """Return the values of a section that the page's template needs, by name.
+    """Return a dict of the values of a section that the page's template needs.
 
-    - ``finding``: a list of lines, of which the page shows ``first_lines`` on its first screen;
-    - ``figures``: for each figure except ``first``, those at the top of the page, a tuple of the
-      plot, its SVG and the SVGs of its panels for phones (:func:`.panels_for_page`);
-    - ``shown``: for each table with rows, a dictionary of its ``id``, name of its ``file``,
-      ``caption``, number of ``rows`` and ``html``, and whether it is ``folded`` and
-      ``is_printed``. The ranking is never folded; methods that are not ranked are always, and are
-      not printed.
+    ``first`` has the figures at the top of the page, which the section does not repeat. The keys of
+    the dict are
+
+    - ``finding``: the finding as a list of lines;
+    - ``first_lines``: how many of these lines the page shows on its first screen;
+    - ``figures``: a tuple for each figure: the plot, its SVG, and the SVGs of its panels for phones
+      (:func:`.panels_for_page`);
+    - ``shown``: a dict for each table that has rows, with its ``id``, the name of its ``file``, its
+      ``caption``, its number of ``rows``, its ``html``, whether it is ``folded`` on the page, and
+      whether it ``is_printed``. The ranking is never folded. The table of methods that are not
+      ranked is always folded, and is not printed.
     """
     drawn = {plot.id for plot in first}
     draws = [draw for draw in section.figures if id_of(draw) + ending_of(study) not in drawn]
@@ -205,18 +219,21 @@ def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str
 
 
 def stamp(runs: pd.DataFrame) -> str:
-    """Return a hash (64 hex digits) of the ids and results of runs, in any order."""
+    """Return a hash (64 hex digits) of the ids and results of runs.
+
+    The hash does not depend on the order of the runs.
+    """
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 
 def _first_figures(study: Study) -> list[Plot]:
-    """Return the figures at the top of the page, as wide as a column of a journal.
+    """Return the figures at the top of the page, one journal column wide.
 
-    They are the ranking and
+    The first figure is the ranking. If the study does not vary parameters, there is a second:
 
-    - the postures at a goal that two tasks share, if all individual tasks are shipped;
-    - otherwise, or if there is no such goal, the tasks;
-    - nothing else if the study varies parameters.
+    - the figure of postures at a goal that two tasks share, by method (:func:`.draw_shared_goal`),
+      if all individual tasks are shipped with coartic;
+    - otherwise, or if there is no such goal, the figure of the tasks.
     """
     draws = [draw_tasks]
     if study.individual_tasks.keys() <= shipped_tasks().keys():
@@ -227,7 +244,7 @@ def _first_figures(study: Study) -> list[Plot]:
 
 
 def _heading_of(study: Study) -> str:
-    """Return a heading that names the tasks, or the suite if there are more than three tasks."""
+    """Return a heading that names up to three tasks, or otherwise the suite."""
     tasks = [marked(task) for task in study.tasks.values()]
     subject = listed(tasks) if len(tasks) <= 3 else f"suite {study.suite}"
     return f"Coarticulation of a simulated robot: {subject}"
@@ -240,10 +257,11 @@ def _sections_shown(
     failures: dict[str, str],
     watch: Callable[[str], object],
 ) -> list[dict[str, Any]]:
-    """Return the sections of a world that have something to show, for the page's template.
+    """Return a dict for each section of a world, for the page's template.
 
-    Errors of parts that could not be made are added to ``failures``, by the title of the section.
-    ``watch`` is called with the title of each section.
+    Sections without figures, tables and errors are left out. ``first`` has the figures at the top
+    of the page (:func:`_parts_of`). If a section cannot be made, its title and the error are added
+    to ``failures``. ``watch`` is called with the title of each section before it is made.
     """
     shown = []
     for section in of_page:
@@ -264,11 +282,20 @@ def _page(
     first: Sequence[Plot],
     failures: dict[str, str],
 ) -> str:
-    """Return the page as HTML, which needs no other file and no network.
+    """Return the page as HTML that needs no other file and no network.
 
-    ``home`` is the path from the page's folder to the results, ``shown`` are the sections, and
-    ``first`` the figures at the top. Errors of parts that could not be made are in ``failures``, by
-    the name of the part.
+    Parameters
+    ----------
+    study : Study
+        Results of the folder, with all worlds.
+    home : str
+        Path of the results folder, relative to the folder of the page.
+    shown : sequence of mapping
+        The sections (:func:`_sections_shown`).
+    first : sequence of Plot
+        The figures at the top of the page.
+    failures : dict of str to str
+        Maps the name of each part that could not be made to its error.
     """
     main = next(iter(study.worlds.values()))
     environment = Environment(

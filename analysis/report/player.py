@@ -1,4 +1,4 @@
-"""The interactive figure of `coartic play`, with the runs of a folder."""
+"""Make the interactive figure of ``coartic play`` with the runs of a results folder."""
 
 from __future__ import annotations
 
@@ -16,23 +16,25 @@ from coartic.robot import HANDS
 
 
 def player(study: Study) -> str:
-    """Return the interactive figure with the runs of a folder as HTML; empty without a preset.
+    """Return the interactive figure with the runs of a study as HTML.
 
-    It is also empty in another world than the paper's, in which the figure does not move.
+    A preset is a task, with a run of each method, that the user can choose in the figure:
 
-    Presets:
+    - Each individual task is a preset if a method whose movements are straight solved it. For each
+      of these methods, the preset has the run whose reward is nearest to the median.
+    - If the goal of :func:`.shared_goal` is goal 1, and a method whose movements are straight
+      solved both tasks, the two tasks together are the first preset. This preset also has the
+      posture difference of random search, if there is random search that is the control.
 
-    - There is a preset for each individual task that a method with straight movements solved. It
-      shows, for each such method, the run whose reward is nearest to the median.
-    - If goal 1 is the :func:`.shared_goal`, and such a method solved both tasks, this goal is the
-      first preset. It has the posture difference of random search, if there is one.
+    The result is the empty string if there is no preset, and in another world than the paper's,
+    because the script of the figure only knows the paper's model.
 
-    The method that is shown first is
+    The method that the figure shows first is
 
-    - the first method from a file that is in a preset, in the order of :func:`.standings`;
+    - the first method from a file, in the order of :func:`.standings`, that is in a preset;
     - otherwise the method of :func:`.shared_goal`, if it is in the first preset;
-    - otherwise the paper's learner that explores as many arms as the first preset has, if it is in
-      the preset, as on the page of ``coartic play``;
+    - otherwise the paper's learner (EC1 if the first preset has one arm, EC4 if it has two), if it
+      is in the first preset. The page of ``coartic play`` begins with it, too;
     - otherwise the first method of the first preset.
     """
     presets, first = [], ""
@@ -82,10 +84,10 @@ def player(study: Study) -> str:
 
 
 def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
-    """Yield the table cells with gaps on a task, and the runs they stand for.
+    """Yield the table cells that show a gap on a task, with their runs.
 
-    An item has the id of the HTML cell, the task, and the label of the method's runs. Cells are of
-    the tables of ranked methods and of methods that are not ranked.
+    Each item has the id of the HTML cell, the name of the task, and the label of the method. The
+    cells are those of the table of ranked methods and of the table of methods that are not ranked.
     """
     by_method = runs_by_method(study)
     for table in (list_ranking, list_not_ranked):
@@ -99,12 +101,18 @@ def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
 
 
 def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
-    """Return the methods that solved all of these tasks, in the form that ``model.js`` reads.
+    """Return the methods that solved all given tasks, in the form that ``model.js`` reads.
 
-    Each has its label ``id``, title ``name``, and ``films``, a film for each task. A film has the
-    movements of one of the first 500 solved runs, the one whose reward is nearest to the median. If
-    there is more than one task, a film also has the postures of these runs at goal 1, which the
-    tasks share. Methods that follow paths are left out, because the script only moves straight.
+    Each method is a dict with the keys
+
+    - ``id``: label of the method;
+    - ``name``: title of the method;
+    - ``films``: a list with a film for each task (:func:`_film_of`). If there is more than one
+      task, a film also has ``reached``: the postures of the first 500 solved runs at goal 1, which
+      the tasks share, in length units and rad.
+
+    Methods with movements of kind ``path`` are left out, because the script only makes straight
+    movements.
     """
     runs = []
     for label in study.methods.index:
@@ -118,11 +126,17 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
 
 
 def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
-    """Return the run of a cell whose reward is nearest to the median, for ``model.js``.
+    """Return the run of a cell that is nearest to the median, for ``model.js``.
 
-    It has ``run`` (the beginning of its id), ``ticks``, and ``movements`` with ``goal`` (from 0),
-    ``hand`` (index in HANDS), ``kind`` and ``target``. It is empty if the cell has no solution, or
-    one of its first 500 solutions follows a path.
+    The run is one of the first 500 solved runs. The film is a dict with the keys
+
+    - ``run``: the first characters of the id of the run;
+    - ``ticks``: ticks of the whole run;
+    - ``movements``: a dict for each movement, with ``goal`` (from 0), ``hand`` (index in HANDS),
+      ``kind`` and ``target`` (length units and rad).
+
+    It is empty if the cell has no solved run, or if a movement of one of these runs is of kind
+    ``path``.
     """
     cell = study.cells.get(key)
     if cell is None or not len(good := solved(cell)[:MAX_EXECUTED]):

@@ -1,4 +1,7 @@
-"""Define the sections of the page: their tables, figures and sentences, and their limits."""
+"""Define the sections of the page: their tables, their figures and their finding in words.
+
+The module also collects facts that limit the conclusions from a study (:func:`limits`).
+"""
 
 from __future__ import annotations
 
@@ -94,35 +97,40 @@ IN_NOISE = (
     "execution without noise. Running times are not shown, because the reward of a single trial is "
     "partly luck."
 )
-"""What is different in a world with noise."""
+"""Note on the page that says what is different in a world with motor noise."""
 
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the page, left out if it has no tables and no figures."""
+    """A section of the page: its tables, its figures and its finding in words.
+
+    The page leaves a section out if no table has rows and no figure can be drawn.
+    """
 
     id: str
     title: str
     tables: tuple[Table, ...]
-    """Tables of the section, functions of a study."""
+    """Tables of the section."""
     figures: tuple[DrawsFigure, ...] = ()
-    """Functions that draw the figures, or return None if the folder has no runs for one. The page
-    folds all figures except the first."""
+    """Functions that draw the figures. A function returns None if the study has no runs for its
+    figure. The page folds all figures except the first."""
     sentence: str = ""
-    """Jinja template of the finding in words, or empty. It can use
+    """Jinja template of the finding in words; empty if the section has no finding. It can use
 
-    - ``rows``: the first table with ``title`` and ``information`` of each method and its
-      ``subject`` (:func:`.subject_of`), without settings and ablations;
-    - ``others``: a list of the other tables, likewise;
+    - ``rows``: the first table of the section, without settings and ablations, with further
+      columns: ``title`` and ``information`` of each method, its name as the ``subject`` of a
+      sentence (:func:`.subject_of`), and ``own`` (True for a method from a file);
+    - ``others``: a list of the other tables of the section, with the same further columns;
     - further names that :func:`.finding` defines.
     """
     note: str = ""
-    """Explanation of figures and tables."""
+    """Text that explains the figures and tables of the section."""
     single: bool = True
-    """True for sections about individual tasks. A study of many random tasks leaves them out."""
+    """True for a section about individual tasks. It is left out for a study without individual
+    tasks (:attr:`.Study.individual_tasks`)."""
     unfolded: tuple[Table, ...] = ()
-    """Tables that the page does not fold unless they are long, because no figure shows their
-    numbers. If the section has figures, but none can be drawn, no table is folded."""
+    """Tables whose numbers no figure shows. The page folds them only if they are long, and folds
+    all other tables. If the section has figures, but none can be drawn, no table is folded."""
 
 
 SECTIONS = (
@@ -287,7 +295,10 @@ ascending=[true, false]) %}
 
 
 def section_of_world(study: Study) -> Section:
-    """Return the section of the page that shows the study of a further world of a folder."""
+    """Return the section of the page for a further world of a folder.
+
+    ``study`` is the study of this world.
+    """
     return replace(
         SECTIONS[0],
         id=f"world{ending_of(study)}",
@@ -308,9 +319,10 @@ def shown(text: str) -> str:
 
 
 def visible_sections(study: Study) -> list[Section]:
-    """Return the sections of the page.
+    """Return the sections of the page for a study.
 
-    If the study has no individual tasks (only many random ones), sections about them are left out.
+    Sections about individual tasks are left out if the study has no individual tasks, but only many
+    random tasks.
     """
     return [section for section in SECTIONS if study.individual_tasks or not section.single]
 
@@ -318,10 +330,11 @@ def visible_sections(study: Study) -> list[Section]:
 def attempt(
     failures: dict[str, str], name: str, make: Callable[..., Made], *args: Any
 ) -> Made | None:
-    """Return ``make(*args)``, a part of a report, or None if it raises an exception.
+    """Return a part of a report, or None if it cannot be made.
 
-    The error, with file and line, is then added to ``failures`` by the ``name`` of the part, unless
-    the part has an error already. A CoarticError is raised again.
+    If ``make(*args)`` raises an exception, the error with its file and line is stored in
+    ``failures`` with the key ``name``, the name of the part, unless this part has an error already.
+    A CoarticError is not caught.
     """
     try:
         return make(*args)
@@ -337,8 +350,10 @@ def attempt(
 def finding(study: Study, section: Section) -> list[str]:
     """Return the finding of a section in words, as a list of lines.
 
-    The template ``sentence`` is filled in from the section's tables. The list is empty if the
-    section has no sentence, or if its first table has no rows and is not the ranking.
+    The lines are made from the tables of the section by its template :attr:`Section.sentence`. For
+    the ranking of a study that varies parameters, they are those of
+    :func:`.answer_on_parameters`. The list is empty if the section has no template, or if its first
+    table has no rows; if this table is the ranking, a line says that no method is ranked.
     """
     is_ranking = section.tables[0] is list_ranking
     if not section.sentence or not len(section.tables[0](study)):
@@ -350,7 +365,7 @@ def finding(study: Study, section: Section) -> list[str]:
     subjects = methods.apply(subject_of, axis=1)
 
     def few(row: Mapping[str, Any]) -> str:
-        """Return a remark that a stochastic method has too few runs for a test, or ""."""
+        """Return a remark if a stochastic method has too few runs, otherwise ""."""
         labels = str(row["method"]), str(row["against"])
         return TOO_FEW * has_few_runs(study, labels, solved_tasks(study, labels[1]))
 
@@ -376,22 +391,23 @@ def finding(study: Study, section: Section) -> list[str]:
 
 
 def varies_parameters(study: Study) -> bool:
-    """Return True if a study varies parameters, and is not asked to compare with one method."""
+    """Return True if a study varies parameters and compares with no single method."""
     return not (study.varied.empty or study.against)
 
 
 @lru_cache  # compiling takes longer than rendering
 def _template_of(sentence: str) -> Template:
-    """Return the template of :attr:`Section.sentence`."""
+    """Return the compiled Jinja template of a :attr:`Section.sentence`."""
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "listed": listed, "capital": capital}
     return environment.from_string(sentence)
 
 
 def _beside(row: Mapping[str, Any], is_first: bool) -> str:
-    """Return in words how far a method is ahead of or behind another, a row of ``differences``.
+    """Return in words how much better or worse than another method a method is.
 
-    Only the first of several names the unit: ``5.0 [4.2, 5.9] points behind CMA-ES``.
+    ``row`` is a row of table ``differences``. The result is such as ``5.0 [4.2, 5.9] points behind
+    CMA-ES``. If several results are listed, only the first (``is_first``) names the unit.
     """
     other = str(row["subject"]).removesuffix(",")
     if row["difference"] == 0:
@@ -404,14 +420,18 @@ def _beside(row: Mapping[str, Any], is_first: bool) -> str:
 
 
 def _first_two(rows: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the first two rows of a table as dicts: all others are settings of the same method."""
+    """Return the first two rows of a table as dicts.
+
+    It replaces :func:`leading` in a study that varies parameters, whose rows are all settings of
+    the same method.
+    """
     return rows[:2].to_dict("records")
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the rows of a table that a finding mentions, as dicts.
+    """Return the rows of a table that a finding mentions, as dicts in order.
 
-    These are the rows of the methods in the first two rows, of the paper's learner, of random
+    These are all rows of the methods in the first two rows, of the paper's learner, of random
     search, and of methods from files.
     """
     always = [joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH]
@@ -421,22 +441,30 @@ def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
 
 @lru_cache(maxsize=4)
 def limits(study: Study) -> dict[str, Any]:
-    """Return facts that limit the conclusions from a study's runs, by name.
+    """Return a dict of facts that limit the conclusions from a study's runs.
 
-    A value is 0, False or empty if the limit does not apply.
+    A value is 0, False or empty if the limit does not apply. The keys are
 
     - ``runs``, ``failed``, ``reasons``: as in :func:`failures_in`;
-    - ``searches``: ids of searches for the optimum in the study's world;
-    - ``reconstructed``: titles of the individual tasks that are reconstructed;
-    - ``unproven``, ``unknown``, ``own``: titles of the individual tasks whose best reward is not
-      proven, is unknown, or is known only from this folder;
-    - ``trials``: numbers of trials of the learner that differ from the paper's;
-    - ``few``: smallest number of runs of the learner on a task, if it is below the paper's;
-    - ``seed``, ``processor``, ``cores``;
-    - ``side_by_side``: True if runs were made at the same time;
-    - ``dirty``: True if the code had changes that are not committed;
-    - ``late``: all :attr:`.Study.marks`;
-    - ``imports``: packages that methods import, by title of the method.
+    - ``searches``: id of a search for the optimum that applies to the study's world;
+    - ``reconstructed``: titles of the individual tasks whose goals are reconstructed;
+    - ``unproven``: titles of the individual tasks whose best known reward is not proven to be the
+      optimum, and is not only known from this folder;
+    - ``own``: titles of the individual tasks whose best known reward is known only from this
+      folder;
+    - ``unknown``: titles of the individual tasks without a best known reward;
+    - ``trials``: numbers of trials of the learner, except the paper's number;
+    - ``few``: smallest number of runs of the paper's learner on a task, if it is below the paper's
+      number of runs;
+    - ``seed``: seed of the suite;
+    - ``processor`` and ``cores``: processor of the machine, and its number of cores;
+    - ``side_by_side``: True if several runs were made at the same time;
+    - ``dirty``: True if the code had changes that were not committed;
+    - ``late``: warnings about methods (:attr:`.Study.marks`);
+    - ``imports``: a dict that maps the title of each method from a file to the packages that the
+      file imports.
+
+    The dict is cached: do not change it.
     """
     runs, made_with = study.runs, study.made_with
     algorithm, papers = study.methods.algorithm, study.methods.is_learner
@@ -483,7 +511,11 @@ def failed_methods(study: Study) -> list[str]:
 
 
 def failures_in(runs: pd.DataFrame) -> dict[str, Any]:
-    """Return numbers of ``runs`` and of ``failed`` runs, and the most frequent ``reasons``."""
+    """Return a dict with the numbers of ``runs`` and ``failed`` runs, and ``reasons`` of failures.
+
+    The reasons are the three most frequent ones with their numbers, and the number of other
+    failures.
+    """
     failed = runs[runs.status != "ok"]
     reasons = failed.reason.fillna("")
     others = len(failed) - sum(reasons.value_counts()[:3])
@@ -495,10 +527,14 @@ def failures_in(runs: pd.DataFrame) -> dict[str, Any]:
 
 
 def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
-    """Return the sentences that follow a table with these columns (:func:`limits`).
+    """Return the sentences on best known rewards that follow below a table (:func:`limits`).
 
-    - With ``gap`` or ``optimum``: which best known rewards are not proven.
-    - With ``gap``: which best known rewards are known only from this folder.
+    ``columns`` are the names of the columns of the table.
+
+    - If it has ``gap`` or ``optimum``, a sentence names the tasks whose best known rewards are not
+      proven.
+    - If it has ``gap``, a sentence names the tasks whose best known rewards are known only from
+      this folder.
     """
     unproven, own, columns = limits(study)["unproven"], limits(study)["own"], set(columns)
     notes = []

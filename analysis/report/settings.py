@@ -1,4 +1,7 @@
-"""Answer a study that varies parameters: which setting is best, and what each parameter does."""
+"""Write the finding of a study that varies parameters.
+
+The finding says which setting is best, and how each parameter changes the gap.
+"""
 
 from __future__ import annotations
 
@@ -28,19 +31,22 @@ from coartic.estimates import LEVEL, MIN_VALUES
 
 TOO_FEW = f" (too few runs to test, which needs {MIN_VALUES})"
 MAX_NAMED = 3
-"""Most settings that are named because they cannot be told apart from the best."""
+"""Largest number of settings that are named because they do not differ significantly from the best
+setting."""
 
 
 def answer_on_parameters(study: Study) -> list[str]:
-    """Return the answer of a study that varies parameters, however many.
+    """Return the finding of a study that varies parameters, as a list of lines.
 
     Returns
     -------
     list of str
-        - The best setting, with those that cannot be told apart from it; the default setting; and
-          the parameters whose value in the best setting is not the best on average.
-        - For each parameter how much its values change the gap (:func:`.list_parameters`).
-        - How many settings stay behind the corrective process alone.
+        - A line on the best setting: its gap, the settings that do not differ significantly from
+          it, the default setting, and the parameters that have a better value on average than in
+          the best setting.
+        - For each parameter, a line on how much its values change the gap
+          (:func:`.list_parameters`).
+        - A line on how many settings are worse than the corrective process alone, if any is.
 
         The list is empty if no setting is ranked.
     """
@@ -52,7 +58,7 @@ def answer_on_parameters(study: Study) -> list[str]:
 
 
 def _best_setting(study: Study, rows: pd.DataFrame) -> str:
-    """Return sentences on the best of the ranked settings ``rows``, the first of them."""
+    """Return sentences on the best setting, which is the first of the ranked settings ``rows``."""
     best, base = str(rows.index[0]), str(rows.method_id.iloc[0])
     method = {**rows.iloc[0], "title": title_of(study.declared[base])}
     others = list_differences(study)
@@ -125,7 +131,10 @@ def _effect_of(study: Study, parameter: str) -> str:
 
 
 def _settings_behind(study: Study, rows: pd.DataFrame) -> str:
-    """Return a sentence on the ranked settings ``rows`` that the corrective process exceeds."""
+    """Return a sentence on the ranked settings that are worse than the corrective process.
+
+    ``rows`` are the ranked settings. The result is the empty string if there is no such setting.
+    """
     behind = rows[rows.share < 0]
     if not len(behind):
         return ""
@@ -142,22 +151,26 @@ def _settings_behind(study: Study, rows: pd.DataFrame) -> str:
 
 
 def _words(study: Study, label: str) -> str:
-    """Return the varied values of a setting in words."""
+    """Return the values of the varied parameters of a setting (its label) in words."""
     return describe_values(dict(zip(study.varied.columns, study.varied.loc[label], strict=True)))
 
 
 def _gap_of(gap: float) -> str:
-    """Return a gap (a share) in per cent."""
+    """Return a gap, which is a fraction, as a string in per cent."""
     return f"{number(100 * gap, 1)} %"
 
 
 def _points(gaps: pd.Series) -> str:
-    """Return how far gaps (shares) are apart, in percentage points."""
+    """Return the range of gaps (fractions), largest minus smallest, in percentage points."""
     return number(100 * float(gaps.max() - gaps.min()), 1)
 
 
 def _range_of(values: Sequence[Any]) -> str:
-    """Return values in words: ``0.02 to 0.2``, or a list of few values."""
+    """Return the values of a parameter in words.
+
+    More than two numbers become a range, such as ``0.02 to 0.2``. Up to four other values are
+    listed; more values are only counted.
+    """
     if are_numbers(values) and len(values) > 2:
         return f"{values[0]} to {values[-1]}"
     return listed(map(str, values)) if len(values) <= 4 else f"{len(values)} values"

@@ -186,7 +186,7 @@ def resolve_methods(
             check_kind(name)  # has a better message for a thing of another kind
             if os.path.isfile(file := file_name(name)):
                 raise CoarticError(
-                    f"unknown method {name!r}: if {file} defines it, add "
+                    f"method {name!r} is unknown: if {file} defines it, add "
                     f"`--method-file {quote(file)}`"
                 ) from None
             known = [*titles, *EVERY_CONDITION, *ids]

@@ -269,7 +269,10 @@ def _perform_again(
         runs = [find_run(run_id, folder) for run_id in run_ids]
         methods = [run.cell.method.name for run in runs]
         if missing := [name for name in methods if name not in registered]:
-            raise CoarticError(f"unknown method {missing[0]!r}: pass --method-file FILE")
+            raise CoarticError(
+                f"method {missing[0]!r} is unknown here: pass the file that defines it, "
+                "--method-file FILE"
+            )
     else:
         runs = some_runs(folder, count, registered)
         with open_store(folder) as store:

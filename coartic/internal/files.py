@@ -144,7 +144,7 @@ def check_ending(path: Path, endings: Collection[str]) -> None:
     if path.suffix.lower() not in endings:
         *others, last = endings
         allowed = f"{', '.join(others)} or {last}" if others else last
-        raise CoarticError(f"the name {path} must end in {allowed}")
+        raise CoarticError(f"{path} has the suffix {path.suffix!r}; it must end in {allowed}")
 
 
 def check_output(path: Path, *, replace: bool) -> None:

@@ -141,7 +141,7 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     end = ", ...; `coartic list` shows all." if len(known) > _MAX_NAMED else "."
     listed = f". Known: {', '.join(known[:_MAX_NAMED])}{end}"
     hint = (did_you_mean(name, known) if isinstance(name, str) else "") or listed
-    return f"unknown {kind} {plain(repr(name), MAX_LINE_LENGTH)}{hint}"
+    return f"{kind} {plain(repr(name), MAX_LINE_LENGTH)} is unknown{hint}"
 
 
 def _refuse_unprintable(text: str) -> str:

@@ -161,5 +161,5 @@ class LearningRun:
         CoarticError if there is no learned solution.
         """
         if not self.learned:
-            raise CoarticError(f"nothing to execute: {self.reason}")
+            raise CoarticError(f"the run has no learned solution to execute: {self.reason}")
         return execute(self.task, self.learned, model=self.model.without_noise())

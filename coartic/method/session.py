@@ -755,7 +755,10 @@ class Session:
         allowed = Meter.COUNTS if self._trusted else Meter.SOLVER
         for name, count in counts.items():
             if name not in allowed:
-                raise ValueError(f"a method cannot set counter {name!r}, only {', '.join(allowed)}")
+                raise ValueError(
+                    f"counter {name!r} cannot be added to by this method; it may add to "
+                    f"{', '.join(allowed)}"
+                )
             left = MAX_COUNT - getattr(self._meter, name)
             check_limits(f"counter {name!r}", count, 0, left)
         self._meter.add(**counts)
@@ -789,7 +792,9 @@ class Session:
         """
         self._needs_trust("reveal")
         if not information:
-            raise UndeclaredError("reveal needs the information that the method uses of the task")
+            raise UndeclaredError(
+                "information is empty; reveal needs each kind of information that the method uses"
+            )
         self._use(*information)
         return self._task
 

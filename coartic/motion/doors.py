@@ -288,10 +288,8 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
     if array.shape != shape:
         raise ValueError(f"{name} has shape {array.shape}; it must be {shape}")
     if not (np.abs(array) <= MAX_ENTRY).all():
-        problem = (
-            f"has a number beyond ±{MAX_ENTRY:g}" if np.isfinite(array).all() else "is not finite"
-        )
-        raise ValueError(f"{name} {brief_value(array.tolist())} {problem}")
+        allowed = f"from -{MAX_ENTRY:g} to {MAX_ENTRY:g}" if np.isfinite(array).all() else "finite"
+        raise ValueError(f"{name} is {brief_value(array.tolist())}; all entries must be {allowed}")
     return array
 
 

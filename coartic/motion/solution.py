@@ -147,7 +147,10 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
         try:
             of_goal.append(_check_movement(task, movement))
             if movement.hand != of_goal[0].hand:
-                raise SolutionError("movements have different hands; a goal needs one hand")
+                raise SolutionError(
+                    f"the movements have the hands {of_goal[0].hand} and {movement.hand}; all "
+                    "movements to one goal must have the same hand"
+                )
         except (SolutionError, ValueError) as error:
             raise SolutionError(f"task {task.name!r}, goal {movement.goal}: {error}") from None
     numbers, expected = [movements[0].goal for movements in plan], [*range(1, len(task.goals) + 1)]
@@ -175,18 +178,25 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
         raise SolutionError(f"kind of a movement is {brief_value(kind)}; it must be one of {kinds}")
     if kind == "path":
         if waypoints is None or not isinstance(waypoints, Iterable) or len([*waypoints]) == 0:
-            raise SolutionError("a path needs waypoints, a list of configurations")
+            raise SolutionError(
+                f"waypoints of a path are {brief_value(waypoints)}; they must be a list of "
+                "configurations, at least one"
+            )
         path = np.array([_check_point(task, point) for point in waypoints], dtype=np.float64)
         if target is not None and not np.array_equal(target, waypoints[-1]):
-            raise SolutionError("the target of a path must be None or its last waypoint")
+            raise SolutionError(
+                f"target of a path is {brief_value(target)}; it must be None or the last waypoint"
+            )
         return replace(movement, target=path[-1], waypoints=path)
     if waypoints is not None:
-        raise SolutionError(f"a {kind} movement cannot have waypoints; only a path can")
+        raise SolutionError(
+            f"waypoints of a {kind} movement must be None; only a movement of kind 'path' has them"
+        )
     if target is not None:
         point = _check_point(task, target, kind)
         return movement if point is target else replace(movement, target=point)
     if kind != "corrective":
-        raise SolutionError(f"a {kind} movement needs a target")
+        raise SolutionError(f"target of a {kind} movement is None; it must be a configuration")
     return movement
 
 

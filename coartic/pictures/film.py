@@ -77,7 +77,10 @@ def write_film(
     check_output(path, replace=replace)
     lengths = [len(movement.configurations) for _, movement in movements]
     if 0 in lengths:
-        raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
+        raise CoarticError(
+            f"{path}: the film has no movement to draw, because all goals are hit before the first "
+            "tick"
+        )
     stride, end = math.ceil(max(lengths) / MAX_FRAMES), max(lengths) - 1
     hits = {int(hit) for _, movement in movements for hit in movement.hits}
     rows = sorted({*range(0, end, stride), *hits, end})
@@ -94,7 +97,9 @@ def write_film(
             )
             write_output(path, film.read_bytes(), replace=replace)
     except subprocess.CalledProcessError as error:
-        raise CoarticError(f"cannot write {path}: ffmpeg failed: {error.stderr}") from None
+        raise CoarticError(
+            f"{path} cannot be written, because ffmpeg failed: {error.stderr}"
+        ) from None
     return len(rows), stride * RATE
 
 

@@ -358,8 +358,8 @@ def movement_data(movement: Movement) -> list[Any]:
     if m.waypoints is not None:
         if m.kind != "path" or not (path is None or np.array_equal(path, m.waypoints[-1])):
             raise ValueError(
-                "only a movement of kind path can have waypoints, and its target must be the last "
-                "of them"
+                f"movement to goal {m.goal} has waypoints and kind {m.kind!r}; its kind must be "
+                "'path', and its target None or the last waypoint"
             )
         path = m.waypoints
     numbers = None if path is None else (real_array("a path", path) + 0.0).tolist()

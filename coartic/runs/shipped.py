@@ -36,7 +36,7 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
         raise CoarticError(f"{path} cannot be read: install coartic again ({error})") from None
     if suite not in hashes:
         raise CoarticError(
-            f"no results of suite {suite!r} are shipped; those of {', '.join(hashes)} are"
+            f"suite {suite!r} has no shipped results; the suites {', '.join(hashes)} have"
         )
     if hashlib.sha256(content).hexdigest() != hashes[suite]:
         raise CoarticError(f"{path} was changed after it was shipped: install coartic again")

@@ -1,10 +1,11 @@
-"""Compare the control of signatures with itself, to see how often the tests are significant.
+"""Compare random search with itself, to see how often the tests of signatures are significant.
 
     python docs/scripts/calibrate_control.py docs/stored/random-search
 
-The script draws 500 pairs of samples from the shipped runs of random search on both one-armed
-tasks. A sample has twenty runs. It compares the samples of a pair as a learner is compared with
-random search, and writes calibration.csv: the share of pairs in which a test is significant at 5 %.
+Random search is the control of signatures. The script draws 500 pairs of samples from the shipped
+runs of random search on both one-armed tasks. Each sample has 20 runs. The script compares the two
+samples of a pair in the same way in which a learner is compared with random search. It writes
+calibration.csv: for each test, the share of pairs in which the test is significant at 5 %.
 """
 
 import sys
@@ -23,7 +24,7 @@ TASKS, SEARCH = ("ascending", "descending"), "random-search"
 
 
 def calibrate(study):
-    """Return the share of pairs of samples that differ significantly, by signature."""
+    """Return the share of pairs that differ significantly, for each test."""
     rng = np.random.default_rng(0)
     first = [study.signature("first", task, SEARCH).dropna().to_numpy() for task in TASKS]
     at_goal = [study.configurations(task, SEARCH)[:, 0] for task in TASKS]

@@ -1,10 +1,12 @@
-"""Compare intervals and a test with the truth, on samples of known populations.
+"""Measure the coverage of intervals and a test's error rate on known populations.
 
     python docs/scripts/calibrate_intervals.py docs/stored/intervals
 
-Writes coverage.csv, a row for each procedure and number of runs (or tasks): the smallest and the
-largest share of 500 samples, over populations like rewards, in which a 95 % interval holds the true
-value, or in which a test at 5 % rejects a hypothesis that is true.
+The script writes coverage.csv, with a row for each procedure and number of runs (or tasks). From
+each of several populations that resemble rewards, it draws 500 samples. For an interval, it counts
+the share of samples whose 95 % interval contains the true value. For a test, it counts the share of
+samples in which the test at 5 % rejects a null hypothesis that is true. The columns ``min`` and
+``max`` are the smallest and the largest of these shares over the populations.
 """
 
 import sys
@@ -25,18 +27,25 @@ POPULATIONS = {
         rng.random(n) < 0.7, -331 + rng.normal(0, 5, n), -355 + rng.normal(0, 1, n)
     ).round(),
 }
-"""Rewards as they occur: rounded, skewed, and on two levels by the hands that are learned."""
+"""Populations that resemble rewards: functions of a random generator and a number of values.
+Rewards are rounded to ticks; some are skewed, and some have two levels, which depend on the hands
+that a run learns."""
 GAP, SPREAD = 0.1, 0.02
-"""Means of exponential gaps of tasks, and of what a run adds to them."""
+"""Mean of the exponential distribution of the gaps of tasks, and mean of the exponential
+distribution of what a run adds to the gap of its task."""
 
 
 def holds(interval, truth):
-    """Return whether an interval holds a value, to rounding."""
+    """Return True if an interval (an Estimate) contains a value, up to rounding."""
     return interval.low - 1e-9 <= truth <= interval.high + 1e-9
 
 
 def of_rewards(rng, draw, n, truth):
-    """Return what each procedure makes of two samples of one population with a known mean."""
+    """Apply each procedure to two samples from a population with known mean.
+
+    Each sample has n values. Returns a dict of booleans: for each interval, whether it contains the
+    true value; and for each test, whether it rejects the null hypothesis, which is true.
+    """
     first, second = draw(rng, n), draw(rng, n)
     welch = stats.ttest_ind(first, second, equal_var=False).confidence_interval()
     return {
@@ -52,13 +61,13 @@ def of_rewards(rng, draw, n, truth):
 
 
 def of_tasks(rng, n):
-    """Return whether the interval over n random tasks, five runs each, holds the mean gap."""
+    """Return whether the interval over n random tasks contains the mean gap."""
     gaps = [gap + rng.exponential(SPREAD, 5) for gap in rng.exponential(GAP, n)]
     return {"mean over random tasks": holds(other_tasks({"family": gaps}), GAP + SPREAD)}
 
 
 def calibrate():
-    """Return the shares by procedure and size."""
+    """Return the smallest and the largest share for each procedure and each sample size."""
     rng, rows = np.random.default_rng(0), []
     for n in SIZES:
         shares = [pd.DataFrame([of_tasks(rng, n) for _ in range(SAMPLES)]).mean()]

@@ -1,37 +1,41 @@
-"""Choose the two-sided test of a mean over tasks by how often it rejects a true hypothesis.
+"""Choose the two-sided test of a mean over tasks by its error rate.
 
     PYTHONPATH=studies python docs/scripts/calibrate_means.py docs/stored/means
 
 Studies test whether a mean over random tasks differs from a bound, by the studentised bootstrap
-(``coartic.analysis.statistics.bootstrap_test``). The script asks how often this test rejects if the
-mean *is* the bound, for values that are distributed as those of our claims. A *cell* is one mean
-that a claim is about. Its population are the values that ship with the study, one for each task,
-shifted to the mean 0. 20,000 samples with as many values are drawn from it with replacement.
+(``coartic.analysis.statistics.bootstrap_test``). The script measures how often this test rejects if
+the mean *is* the bound, for values that are distributed like those of our claims. A *cell* is one
+mean that a claim is about. The population of the cell consists of the values that ship with the
+study, one for each task, shifted to the mean 0. From this population, 20,000 samples of the same
+size are drawn with replacement.
 
-Two-sided candidates:
+There are two candidates for the two-sided test:
 
-- ``|t|``: p is the share of resamples whose |t| is at least as large;
-- ``equal-tailed``: p is twice the smaller one of the two one-tailed p.
+- ``|t|``: the p-value is the share of resamples whose |t| is at least as large;
+- ``equal-tailed``: the p-value is twice the smaller of the two one-sided p-values.
 
-**Rule**, committed before the first result: at the level 5 %, the equal-tailed test is taken if its
-largest share of rejected samples over all cells is not above that of |t|. Otherwise |t| stays.
+**Rule**, committed before the first result: the equal-tailed test is chosen if, at the level 5 %,
+its largest share of rejected samples over all cells is not above that of |t|. Otherwise |t| is
+kept.
 
-Columns that describe, and do not count in the choice:
+The table has further columns that describe the tests and do not count in the choice:
 
 - both candidates at the level 1 %;
-- ``greater`` and ``less``: the one-tailed tests at 5 %, in the direction of the claim;
-- ``with the rule``: the share of samples with p < 0.01, or p < 0.05 and a skewness of at most 2 (as
-  verdicts are made, without a correction over claims), for the two-sided candidates and the
-  one-tailed tests.
+- ``greater`` (the direction of the claim) and ``less``: the one-sided tests at 5 %;
+- ``with the rule``: for the two-sided candidates and the one-sided tests, the share of samples with
+  p < 0.01, or with p < 0.05 and an absolute skewness of at most 2. This is the rule of verdicts,
+  without the adjustment over claims.
 
-All samples of a size have the same resamples, 999 of them.
+All samples of the same size have the same 999 resamples.
 
 Two more tables describe intervals over random tasks (``coartic.analysis.other_tasks``):
 
 - ``coverage.csv``: for each method and family, the share of 500 samples of gaps in which the 95 %
-  interval holds the mean of the population, which are the shipped gaps of 40 tasks;
-- ``widths.csv``: how many times wider the interval is than it should be, for normal values, by the
-  number of runs on a task and the ratio of the SD over runs to the SD over tasks.
+  interval contains the mean of the population. The population consists of the shipped gaps of 40
+  tasks;
+- ``widths.csv``: the width of the interval divided by the width of the true interval, for normal
+  values. There is a row for each number of runs on a task, and each ratio of the SD over runs to
+  the SD over tasks.
 
 The script takes some minutes.
 """
@@ -58,18 +62,20 @@ METHODS = {
     "hill-climbing": "hill climbing", "random-search": "random search",
     "cma-es/bandit": "CMA-ES",
 }  # fmt: skip
-"""Methods that study noise compares with the learner."""
+"""Maps ids of the methods that study noise compares to their names. Forms of the learner for one
+and for two arms have the same name."""
 
 
 DEFAULTS = {
     "dual-process": {"counted": "later", "discount": 0.0},
     "receding-horizon": {"nodes": 200, "horizon": 1},
 }
-"""Settings that the labels of shipped runs leave out, by the first part of the method."""
+"""Maps the first part of a method's id to the defaults of its parameters, which the settings of
+shipped runs leave out."""
 
 
 def program(study):
-    """Return the program of a study and its shipped rows."""
+    """Import the program of a study, and return it with the study's shipped runs."""
     folder = ROOT / "studies" / study
     for name in {path.stem for path in (ROOT / "studies").glob("*/*.py")} & {*sys.modules}:
         del sys.modules[name]  # modules of studies have the same names
@@ -81,7 +87,10 @@ def program(study):
 
 
 def with_settings(rows):
-    """Return the runs that ship with a study, as a study with runs and signatures."""
+    """Return an object with the attributes ``runs`` and ``signature`` of a study, for shipped runs.
+
+    ``rows`` are the runs that ship with a study.
+    """
     settings = [
         dict(each.split("=") for each in text.split(", ")) if text else {}
         for text in rows.setting.fillna("")
@@ -108,7 +117,7 @@ def with_settings(rows):
 
 
 def claims_of(study):
-    """Judge the claims of a study by its shipped rows, and return its table of claims."""
+    """Judge the claims of a study by its shipped runs, and return the table."""
     program_, rows = program(study)
     if study == "dial":
         moved = pd.read_csv(ROOT / "studies/dial/moved.csv")
@@ -132,7 +141,11 @@ def claims_of(study):
 
 
 def samples_of_claims(study):
-    """Return words and values of each mean of a study's claims, less the bound (claimed: > 0)."""
+    """Return the words and the values over tasks of each mean in a study's claims.
+
+    The bound is subtracted from the values. If the mean is claimed to lie below the bound, their
+    sign is changed, so that each claim is that the mean is above 0.
+    """
     samples, judge = [], judging.mean_beyond
 
     def record(sentence, values, bound=0.0, side="greater"):
@@ -151,7 +164,10 @@ def samples_of_claims(study):
 
 
 def samples_of_hands():
-    """Return gains of the learner less those of hill climbing with centres, by family."""
+    """Return a dict that maps each family to differences of gains on its tasks.
+
+    A difference is the gain of the learner's table minus the gain of hill climbing with centres.
+    """
     runs = pd.read_csv(ROOT / "studies/memory/hands.csv.xz")
     gains = runs.pivot_table("reward", ["family", "task"], "cell")
     more = gains.table - gains.centres
@@ -160,7 +176,10 @@ def samples_of_hands():
 
 
 def gaps_of_noise(noise):
-    """Return the gaps that ship with study noise, by family and task, with a column a method."""
+    """Return the gaps (per cent) that ship with study noise at a motor noise.
+
+    The frame is indexed by family and task, and has a column for each method.
+    """
     rows = pd.read_csv(ROOT / "studies/noise/runs.csv.xz", low_memory=False)
     rows = rows[(rows.question == "practised") & (rows.target == "T") & rows.setting.isna()]
     rows = rows[rows.method.isin(METHODS)]
@@ -171,7 +190,11 @@ def gaps_of_noise(noise):
 
 
 def samples_of_noise():
-    """Return gaps of methods less the learner's, without noise and as they aim, by family."""
+    """Return gaps of methods minus the learner's gaps, without noise and with motor noise 0.01.
+
+    The dict maps words, which name family, method and noise, to an array with a value for each
+    task.
+    """
     samples = {}
     for noise in (0.0, 0.01):
         gaps = gaps_of_noise(noise)
@@ -184,7 +207,7 @@ def samples_of_noise():
 
 
 def every_sample():
-    """Yield the study, the words and the values of each cell."""
+    """Yield the study, the words, and the values over tasks of each cell."""
     for study in ("dial", "dose", "fourteen", "horizon", "memory"):
         for words, values in samples_of_claims(study):
             yield study, words, values
@@ -203,16 +226,16 @@ def skewness(values):
 
 
 def t_of(means, variances):
-    """Return t; 0 where the mean is 0, and infinite where only the variance is."""
+    """Return t: 0 where the mean is 0, infinite where only the variance is 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(np.abs(means) < 1e-9, 0.0, means / np.sqrt(variances))
 
 
 def p_by_test(samples, counts):
-    """Return the p-values of all tests for each sample.
+    """Return a dict that maps each test to the p-values of all samples, shape ``(samples,)``.
 
-    ``samples`` has a sample in each row, and ``counts``, shape (values, resamples), how often each
-    resample has each value.
+    ``samples`` has a sample in each row, shape ``(samples, n)``. ``counts``, shape
+    ``(n, resamples)``, says how often each resample draws each value.
     """
     n = samples.shape[1]
     shifted = samples - samples.mean(axis=1, keepdims=True)
@@ -232,7 +255,10 @@ def p_by_test(samples, counts):
 
 
 def cell(values, rng):
-    """Return the shares of samples that are rejected, by test and level."""
+    """Return the share of rejected samples of a cell, by test and level.
+
+    ``values`` is the population of the cell.
+    """
     centred, n = values - values.mean(), len(values)
     draws = np.random.default_rng([SEED, n]).integers(n, size=(RESAMPLES, n))
     counts = np.stack([np.bincount(draw, minlength=n) for draw in draws], axis=1).astype(float)
@@ -252,7 +278,10 @@ def cell(values, rng):
 
 
 def coverage():
-    """Return how often the interval over tasks holds the mean gap, by method and family."""
+    """Return how often the interval over tasks contains the mean gap.
+
+    The frame has a row for each method and family.
+    """
     rows, rng = [], np.random.default_rng(SEED)
     for name, of_method in gaps_of_noise(0.0).items():
         for family, gaps in of_method.groupby("family", sort=False):
@@ -268,7 +297,11 @@ def coverage():
 
 
 def widths(tasks=40):
-    """Return the mean width of the interval, divided by that of the true 95 % interval."""
+    """Return the mean width of the interval, divided by the true width.
+
+    The interval is the 95 % interval over tasks. The frame has a row for each number of runs on a
+    task, and each ratio of SDs. Each sample has ``tasks`` tasks.
+    """
     rows, rng = [], np.random.default_rng(SEED)
     for runs, ratio in itertools.product((3, 5, 20), (0.5, 1.0, 2.0, 4.0)):
         found = []

@@ -1,4 +1,4 @@
-"""Choose the test of two samples by how often candidates reject a true hypothesis.
+"""Choose the test of two samples by how often candidates reject a true null hypothesis.
 
     python docs/scripts/calibrate_tests.py docs/stored/two-samples
 
@@ -7,18 +7,20 @@ The script writes ``cells.csv``, with a row for each population and pair of size
 of samples at the level 5 %, or more than 1.5 % at the level 1 %. The package uses the candidate
 with the fewest such cells. At a tie it uses the simpler candidate, which is the first in the table.
 
-All candidates are two-sided and studentised, with a variance for each sample. If no sample varies,
-t is infinite or 0. The candidates are
+All candidates are two-sided. Their statistic t is the difference of the means divided by its
+standard error, which has a separate variance for each sample. If both variances are 0, t is
+infinite, or 0 if the means are equal. The candidates are
 
-- ``exchange``: labels of the values are exchanged, in all ways if there are at most as many ways as
-  resamples;
-- ``bootstrap``: each sample is shifted to mean 0 and resampled. If no sample varies and the means
-  differ, p is the smallest p of an exchange of as many values;
-- ``exchange below N``: exchange if the smaller sample has fewer than N values, otherwise bootstrap.
+- ``exchange``: a permutation test, which exchanges the labels of values. All ways to exchange
+  labels are used if there are not more of them than resamples;
+- ``bootstrap``: each sample is shifted to the mean 0 and resampled. If no sample varies and the
+  means differ, p is the smallest p that ``exchange`` can give for samples of the same sizes;
+- ``exchange below N``: ``exchange`` if the smaller sample has fewer than N values, otherwise
+  ``bootstrap``.
 
-Columns that begin with ``greater`` or ``less`` have the one-tailed exchange (the mean of the first
-sample is higher, or lower) for populations with skew and unequal spread. They describe the test,
-and do not count in the choice.
+Columns that begin with ``greater`` or ``less`` have the one-sided ``exchange`` (the mean of the
+first sample is higher, or lower) for populations with skew and unequal spread. These columns
+describe the test, and do not count in the choice.
 
 Grid, seeds and numbers were committed before the first result. The populations that have both skew
 and unequal spread were added later, again before their results, and the rule is the same. As in
@@ -39,32 +41,36 @@ SIZES = [
     *((3, 20), (3, 100), (5, 100), (10, 100), (20, 100), (100, 500)),
 ]
 SIDES = {0.05: 0.06, 0.01: 0.015}
-"""Levels, and the share of samples above which a test rejects too often."""
+"""Maps each level of significance to the share of rejected samples above which a test rejects too
+often."""
 LIMITS = {
     "exchange": math.inf, "bootstrap": 0,
     **{f"exchange below {n}": n for n in (10, 20, 50)},
 }  # fmt: skip
-"""Candidates, the simplest first, with the size of the smaller sample below which they use
-exchange."""
+"""Maps each candidate, the simplest first, to a limit: the candidate uses ``exchange`` if the
+smaller sample has fewer values than this limit, and otherwise ``bootstrap``."""
 
 
 def levels(values, shares):
-    """Return a population of a few values with these shares."""
+    """Return a population of the given values, which occur with the given probabilities.
+
+    A population is a function of a random generator and a shape.
+    """
     return lambda rng, shape: rng.choice(np.array(values, dtype=float), size=shape, p=shares)
 
 
 def skewed(rng, shape):
-    """Return values of a log-normal population with the mean 0."""
+    """Draw values from a log-normal distribution that is shifted to the mean 0."""
     return np.exp(rng.normal(size=shape)) - math.exp(0.5)
 
 
 def skewed_by(factor):
-    """Return the log-normal population with the mean 0, its values multiplied by a factor."""
+    """Return the population :func:`skewed`, with all values multiplied by a factor."""
     return lambda rng, shape: factor * skewed(rng, shape)
 
 
 def normal(sd):
-    """Return a normal population with the mean 0."""
+    """Return a normal population with the mean 0 and the standard deviation ``sd``."""
     return lambda rng, shape: rng.normal(0.0, sd, shape)
 
 
@@ -85,15 +91,16 @@ POPULATIONS = {
     "three skewed levels, first spread 3": (levels([0, 3, 30], [0.7, 0.25, 0.05]),
                                             levels([1.5, 2.5, 11.5], [0.7, 0.25, 0.05])),
 }  # fmt: skip
-"""Populations of the two samples, with equal means."""
+"""Maps names to pairs of populations with equal means, one for each of the two samples."""
 ONE_TAILED = [*POPULATIONS][-4:]
-"""Populations with skew and unequal spread, for which one-tailed tests are described."""
+"""Populations with skew and unequal spread, for which one-sided tests are described."""
 
 
 def studentised(sums, squares, sizes):
-    """Return |t| of two samples from the sums of their values and squares.
+    """Return the t statistic of two samples, computed from sums of their values and squares.
 
-    If no sample varies, |t| is 0 or infinite.
+    ``sums`` and ``squares`` have an array for each sample, and ``sizes`` the sizes of the samples.
+    If no sample varies, t is infinite, or 0 if the means are equal.
     """
     means = [total / n for total, n in zip(sums, sizes, strict=True)]
     parts = [
@@ -109,10 +116,14 @@ def studentised(sums, squares, sizes):
 
 
 def exchanges(sizes, rng):
-    """Return exchanges of the values of two samples.
+    """Return ways to exchange the values of two samples of the given sizes.
 
-    The first result says which values are in the first sample after each exchange, as entries 0 and
-    1, shape ``(values, ways)``. The second result is True if these are all possible exchanges.
+    Returns
+    -------
+    ndarray, shape (values, ways)
+        1 for each value that is in the first sample after the exchange, otherwise 0.
+    bool
+        True if these are all possible ways; otherwise they are random.
     """
     n, first = sum(sizes), sizes[0]
     if math.comb(n, first) <= RESAMPLES:
@@ -125,15 +136,20 @@ def exchanges(sizes, rng):
 
 
 def draws(sizes, rng):
-    """Return how often each value of each sample is drawn, shapes ``(n, RESAMPLES)``."""
+    """Return, for each sample, how often each bootstrap sample draws each of its n values.
+
+    The arrays have shape ``(n, RESAMPLES)``.
+    """
     return [rng.multinomial(n, np.full(n, 1 / n), RESAMPLES).T.astype(float) for n in sizes]
 
 
 def p_by_test(samples, members, exact, drawn):
-    """Return p of each pair of samples by test.
+    """Return a dict that maps each test to the p-values of all pairs of samples.
 
-    ``samples`` are two arrays of shape ``(pairs, n)``. The tests are ``exchange`` and ``bootstrap``
-    (two-sided), and ``greater`` and ``less`` (one-tailed exchange).
+    An array of p-values has shape ``(pairs,)``. The tests are ``exchange`` and ``bootstrap``
+    (two-sided), and ``greater`` and ``less`` (one-sided ``exchange``). ``samples`` has an array for
+    each of the two samples, shape ``(pairs, n)``. The other arguments are those of
+    :func:`exchanges` and :func:`draws`.
     """
     sizes = [sample.shape[1] for sample in samples]
     both = np.concatenate(samples, axis=1)
@@ -168,9 +184,9 @@ def p_by_test(samples, members, exact, drawn):
 
 
 def cell(name, sizes):
-    """Return the shares of samples that are rejected, by test and level.
+    """Return the share of rejected pairs of samples of a cell, by test and level.
 
-    ``name`` is the population, and ``sizes`` are the sizes of the two samples.
+    ``name`` is the name of the populations, and ``sizes`` are the sizes of the two samples.
     """
     rng = np.random.default_rng([SEED, [*POPULATIONS].index(name), *sizes])
     members, exact = exchanges(sizes, rng)
@@ -188,7 +204,7 @@ def cell(name, sizes):
 
 
 def candidates(cells):
-    """Return the number of cells in which each candidate rejects too often."""
+    """Return the number of cells in which each candidate rejects a true hypothesis too often."""
     small = cells[["first", "second"]].min(axis=1)
     rows = {}
     for name, limit in LIMITS.items():

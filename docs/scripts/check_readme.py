@@ -2,7 +2,7 @@
 
     python docs/scripts/check_readme.py FOLDER
 
-Differences are printed. They are not an error.
+The script prints the differences. Differences are not an error.
 """
 
 from __future__ import annotations
@@ -17,13 +17,17 @@ from coartic.analysis import TABLES, Study, interval, load
 
 README = Path(__file__).parents[2] / "README.md"
 COLUMNS = ("gap", "noisy_gap", "share")
-"""Columns of :func:`ranking_of` that the table of README has, in order."""
+"""Columns of :func:`ranking_of` that the table of README shows, in its order."""
 NOISE = "motor_noise=0.01"
-"""The world of the second column. Methods practise and are judged in it."""
+"""World of the second column of the table: methods practise and are judged in this world."""
 
 
 def rows_of(text: str) -> dict[str, tuple[str, ...]]:
-    """Return the gaps without and with motor noise and the share (in per cent), by row."""
+    """Return a dict that maps each row of README's table to its numbers.
+
+    The numbers are strings in per cent: the gap without noise, the gap with motor noise, and the
+    share of the possible gain.
+    """
     row = r"^\| \**(.+?)\**(?: of the paper|:.*?)? \| .+? \| (.+?%.*?) \| (.+?%.*?) \| (.+?) \|$"
     rows = re.findall(row, text, re.MULTILINE)
     return {name: tuple(cell.replace("*", "") for cell in cells) for name, *cells in rows}
@@ -32,7 +36,8 @@ def rows_of(text: str) -> dict[str, tuple[str, ...]]:
 def differences(text: str, ranking: pd.DataFrame) -> tuple[int, list[str]]:
     """Compare README's table with a ranking whose index has the titles of methods.
 
-    Returns the number of rows of README's table, and a line for each row that differs.
+    ``text`` is the text of README. Returns the number of rows of README's table, and a line for
+    each row that differs.
     """
     lines, rows = [], rows_of(text)
     for name, printed in rows.items():
@@ -54,7 +59,11 @@ def differences(text: str, ranking: pd.DataFrame) -> tuple[int, list[str]]:
 
 
 def ranking_of(study: Study) -> pd.DataFrame:
-    """Return the ranking in the paper's world by titles of methods, with the gap in noise."""
+    """Return the ranking in the paper's world, with gaps in the noisy world.
+
+    The frame is indexed by the titles of methods. The columns ``noisy_gap``, ``noisy_gap_low`` and
+    ``noisy_gap_high`` are replaced by the gap in the world with noise.
+    """
     paper, noise = (TABLES["ranking"](study.worlds[world]) for world in ("", NOISE))
     ends = "", "_low", "_high"
     of_noise = noise[[f"gap{end}" for end in ends]].reindex(paper.index)
@@ -63,7 +72,7 @@ def ranking_of(study: Study) -> pd.DataFrame:
 
 
 def main(folder: str) -> None:
-    """Print the differences between README and a folder."""
+    """Print the differences between the table of README and a results folder."""
     ranking = ranking_of(load(folder))
     count, lines = differences(README.read_text("utf-8"), ranking)
     print(f"{count - len(lines)} of {count} rows are equal to the table of README.")

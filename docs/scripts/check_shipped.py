@@ -2,13 +2,15 @@
 
     python docs/scripts/check_shipped.py
 
-The script performs one run of each cell of suite ``comparison``, and one run of the cheapest cell
-of each method on each family of suite ``families``. With ``--all`` it performs one run of each cell
-of both suites, which takes an hour. Runs by an earlier version of their method are not performed:
-the script counts them as to be made again.
+A cell is a task and a method with its setting. The script performs one run of each cell of suite
+``comparison``. Of suite ``families``, it performs one run of each method on each family, in the
+cell that costs the least time. With ``--all`` it performs one run of each cell of both suites,
+which takes an hour. Runs by an earlier version of their method are not performed; the script prints
+how many there are.
 
-With ``--release`` it also names the methods and families that nothing would compare with later
-versions, with the entries that they need in :data:`SHORT_RUNS` and :data:`FAMILIES`.
+With ``--release`` the script also names the methods and families for which nothing shows whether a
+later version changes them, and the entries that they need in :data:`SHORT_RUNS` and
+:data:`FAMILIES`.
 """
 
 from __future__ import annotations
@@ -43,9 +45,10 @@ SHORT_RUNS = {
     "optimum/search": ("ascending", -292, "RRR", 46),
     "optimum/in-model": ("ascending", -292, "RRR", 46),
 }
-"""Task, reward, hands, and control ticks of all trials or iterations of the solver, of methods
-without a shipped run, with seed 1 and 2,000 trials; and of planners whose cheapest shipped run
-takes seconds, with the parameters of a quick check."""
+"""Maps methods to the results of short runs with seed 1: task, reward, hands, and either the ticks
+of all movements or the number of iterations of the solver. These are methods without a shipped run,
+with 2,000 trials, and planners whose cheapest shipped run takes seconds, with the parameters of a
+quick check."""
 FAMILIES = {
     "aligned/v1": "7d54471d916711ce",
     "long/v1": "f1f48d64e2a1d1ee",
@@ -54,16 +57,18 @@ FAMILIES = {
     "redundancy/v1": "74dc928d21a32f17",
     "two-armed/v1": "3c581b274307a7ab",
 }
-"""Hashes of the released families (:func:`family_hash`). A family never changes, because results of
-the same name would not be comparable. Another distribution has another version."""
+"""Maps released families to their hashes (:func:`family_hash`). A family never changes, because
+results on tasks of the same name would not be comparable. A family with another distribution gets a
+new version."""
 CELL = ["suite", "task", "method", "setting"]
 
 
 def shipped_runs() -> pd.DataFrame:
     """Return all shipped runs that have a solution, the cheapest first.
 
-    They have the additional columns ``family`` (for a task of the paper its name) and
-    ``is_current`` (True if the version of the method is that of this installation).
+    The frame has two additional columns: ``family`` is the family of the task, or the name of a
+    task of the paper; ``is_current`` is True if the run was made by the version of the method that
+    is installed here.
     """
     frames = []
     for suite in shipped_hashes():
@@ -79,10 +84,11 @@ def shipped_runs() -> pd.DataFrame:
 
 
 def chosen(runs: pd.DataFrame, *, every: bool = False) -> pd.DataFrame:
-    """Select the runs to perform.
+    """Return the runs that are performed again.
 
-    They are the first run of each cell of ``comparison``, and of the cheapest cell of each method
-    on each family of the other suites. With ``every``, they are the first run of all cells.
+    These are the first run of each cell of suite ``comparison``, and of the other suites the first
+    run of the cheapest cell of each method (with its setting) on each family. If ``every`` is True,
+    they are the first run of each cell.
     """
     cells = runs.sort_values("run", kind="stable").groupby(CELL, sort=False).head(1)
     if every:
@@ -93,9 +99,10 @@ def chosen(runs: pd.DataFrame, *, every: bool = False) -> pd.DataFrame:
 
 
 def differences(rows: pd.DataFrame) -> Iterator[str]:
-    """Perform shipped runs again, and yield a sentence on each difference.
+    """Perform shipped runs again, and yield a sentence for each run whose result differs.
 
-    Runs by earlier versions of their method (``is_current`` is False) are left out.
+    ``rows`` are rows of :func:`shipped_runs`. Runs by earlier versions of their method
+    (``is_current`` is False) are left out.
     """
     runs = list[Row]()
     for suite, of_suite in rows[rows.is_current].groupby("suite"):
@@ -111,7 +118,7 @@ def differences(rows: pd.DataFrame) -> Iterator[str]:
 
 
 def short_run(name: str, task: str) -> tuple[str, int, str, int]:
-    """Perform the short run of a method on a task, and return it as in :data:`SHORT_RUNS`."""
+    """Perform the short run of a method, and return its entry in :data:`SHORT_RUNS`."""
     info = built_in()[name]
     trials = {"trials": 2000} if "trials" in info.defaults else {}
     parameters = info.configure(trials | info.load().quick)
@@ -122,16 +129,17 @@ def short_run(name: str, task: str) -> tuple[str, int, str, int]:
 
 
 def family_hash(name: str) -> str:
-    """Return a hash (16 hex digits) of a family and a task of each split that it draws."""
+    """Return a hash (16 hex digits) of a family and a task of each split."""
     family = json.dumps(shipped_families()[name].model_dump(mode="json"), sort_keys=True)
     drawn = [task_text(instance(f"{name}/{number}")) for number in ("i017", "d003", "2027-041")]
     return hashlib.sha256("".join([family, *drawn]).encode()).hexdigest()[:16]
 
 
 def missing_entries(runs: pd.DataFrame) -> Iterator[str]:
-    """Yield a sentence for each method and family that nothing would compare with later versions.
+    """Yield a sentence for each method and family that later versions could change unnoticed.
 
-    ``runs`` are the shipped runs. The sentences have the entries that are missing.
+    ``runs`` are the shipped runs. A sentence has the entry that is missing in :data:`SHORT_RUNS` or
+    :data:`FAMILIES`.
     """
     for name, info in built_in().items():
         if name not in {*runs.method, *SHORT_RUNS}:
@@ -144,7 +152,10 @@ def missing_entries(runs: pd.DataFrame) -> Iterator[str]:
 
 
 def result_of(run: Row) -> str:
-    """Return reward, hands and ticks of each movement of the parts of a run, as a string."""
+    """Return the reward, the hands and the ticks of a run's parts as a string.
+
+    The ticks are those of each movement.
+    """
     parts = [part for part in PREFIXES if part in run.movements]
     ticks = [[movement.ticks for movement in run.part(part)] for part in parts]
     words = [

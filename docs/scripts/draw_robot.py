@@ -2,7 +2,7 @@
 
     python docs/scripts/draw_robot.py
 
-writes ``docs/robot.svg`` and ``docs/nullspace.svg``.
+The script writes ``docs/robot.svg`` and ``docs/nullspace.svg``.
 """
 
 from pathlib import Path
@@ -17,14 +17,14 @@ from coartic.pictures.drawing import draw_robot
 from coartic.robot import Array
 
 Q = np.array([0, 0, 2.5, -0.8, 0.6, 0.5, 0.5, 0.6, -0.8, 0.5])
-"""Configuration: base, left arm, right arm."""
+"""Configuration of the robot: base (length units), left arm and right arm (rad)."""
 ANGLE = 0.55
-"""Radius of the arcs of angles, in length units."""
+"""Radius of the arcs that show joint angles, in length units."""
 
 
 @styled
 def robot() -> Figure:
-    """Draw the robot, the names of its joints, and how angles are measured."""
+    """Draw the robot with the names of its joints, and arcs of its angles."""
     task = load_task("two-armed-2")
     drawing, (axes,) = panels((1, 1), (TWO, 0.42 * TWO))
     draw_robot(axes, task, Q, weight=1.6)
@@ -56,12 +56,18 @@ def robot() -> Figure:
 
 @styled
 def nullspace() -> Figure:
-    """Draw postures that hit goal 1. The one that is nearest to a posture of goal 2 is black."""
+    """Draw several postures that hit goal 1, and a posture that hits goal 2.
+
+    The posture at goal 1 that is nearest to the posture at goal 2 is black.
+    """
     task = load_task("ascending")
     arm, goals = task.robot.joints("right"), np.array([(3.2, 1.4), (3.6, -0.4)])
 
     def hitting(goal: Array, angles: Array) -> Array:
-        """Return the configuration that Newton steps of the four joints find from some angles."""
+        """Return a configuration whose right hand is at a goal, found by damped Newton steps.
+
+        ``angles`` are the angles of the four joints of the right arm at the start, in rad.
+        """
         q = np.zeros(task.robot.dof)
         q[arm] = angles
         for _ in range(200):

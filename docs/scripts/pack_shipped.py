@@ -3,12 +3,12 @@
     python docs/scripts/pack_shipped.py FOLDER
     python docs/scripts/pack_shipped.py --noise
 
-The second form executes the shipped solutions with motor noise again and packs the new ticks. No
-method runs.
+The first form packs results folders. The second form executes the shipped solutions with motor
+noise again, and packs them with the new ticks; no method is run.
 
-Without ``--changed`` the script packs a folder only if its runs have the same results as the
-shipped runs. The rewards of trials are downsampled (:meth:`coartic.runs.record.Run.downsample`), so
-that the files have 5 MB instead of 150 MB.
+A folder whose runs have other results than the shipped runs is only packed with ``--changed``. The
+rewards of trials are downsampled (:meth:`coartic.runs.record.Run.downsample`), so that the files
+have 5 MB instead of 150 MB.
 """
 
 from __future__ import annotations
@@ -32,9 +32,10 @@ from coartic.runs.store import RUNS_FILE, Store, open_store, open_store_for_writ
 
 
 def changed_runs(folder: Path) -> Iterator[str]:
-    """Yield a sentence for each shipped run that a folder lacks or whose result differs there.
+    """Yield a sentence for each shipped run that a folder lacks or changes.
 
-    Raises CoarticError if a method of the folder has another version here.
+    A folder changes a run if the run has another result there. Raises CoarticError if the
+    folder has a method whose version is not the one installed here.
     """
     with open_store(folder) as made:
         plan = made.plan()
@@ -58,16 +59,16 @@ def changed_runs(folder: Path) -> Iterator[str]:
 
 
 def runs_with_noise(source: Store) -> Iterator[Row]:
-    """Execute the solutions of a folder with motor noise again, and yield its runs."""
+    """Yield the runs of a folder, with their solutions executed again with motor noise."""
     ids = iter(source.runs().run_id)
     for job in source.plan():
         yield from with_noise([source.run(next(ids)) for _ in job.numbers])
 
 
 def pack(source: Store, runs: Iterable[Row], out: Path) -> None:
-    """Pack downsampled runs with the plan of ``source`` into the folder ``out``.
+    """Pack runs, with downsampled rewards and the plan of ``source``, into the folder ``out``.
 
-    The hashes of all packed results in this folder are written, too.
+    The file with the hashes of all packed results in this folder is written, too.
     """
     with tempfile.TemporaryDirectory() as made:
         plan = source.plan()
@@ -82,9 +83,10 @@ def pack(source: Store, runs: Iterable[Row], out: Path) -> None:
 
 
 def main() -> int:
-    """Pack the folders of the command line, unless shipped results would change.
+    """Pack the folders that the command line names, unless shipped results would change.
 
-    With ``--changed``, they are also packed if results change. Returns 1 if nothing was packed.
+    With ``--changed``, folders are also packed if results change. Returns 1 if nothing was packed,
+    otherwise 0.
     """
     parser = argparse.ArgumentParser(prog="python docs/scripts/pack_shipped.py")
     parser.add_argument("--changed", action="store_true", help="pack results that have changed")

@@ -1,4 +1,4 @@
-"""Compile and call ``plain_loop.c``, a plain loop over the control steps of a trial in C."""
+"""Compile and call ``plain_loop.c``: a loop in C over the control steps of a trial."""
 
 from __future__ import annotations
 
@@ -17,7 +17,19 @@ from coartic.robot import BASE_DOF, HANDS, Array
 def trials_in_c(task: Task, hands: str, targets: Array) -> dict[str, Callable[[], Array]]:
     """Compile ``plain_loop.c``, and return functions that make trials one after the other.
 
-    The functions return the ticks of the trials. One of them skips steps by bounds.
+    Parameters
+    ----------
+    task : Task
+    hands : str
+        Hand sequence of all trials, such as ``"RRLR"``.
+    targets : ndarray, shape (trials, goals, dof)
+        Target of each movement, in length units and rad.
+
+    Returns
+    -------
+    dict of str to callable
+        Two functions by name. Each makes all trials and returns their ticks, shape ``(trials,)``.
+        One of them uses bounds to skip control steps at which the hand cannot hit the goal.
     """
     library = Path(tempfile.mkdtemp()) / "plain_loop.so"
     source = Path(__file__).with_suffix(".c")

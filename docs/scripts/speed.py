@@ -1,9 +1,10 @@
-"""Measure how fast trials are, through each public function and in each of the paper's experiments.
+"""Measure the CPU time of a trial, for public functions and the paper's experiments.
 
     python docs/scripts/speed.py
 
 The script writes the times of the functions into the table of ``docs/howto/install.md``. Times
-depend on the machine: compare ratios, and times of the same call.
+depend on the machine. Therefore compare only ratios of times, or times of the same run of the
+script.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from coartic.motion.solution import movements_of
 
 
 def main() -> None:
-    """Print all times, and write the table of the page."""
+    """Print all times, and write the table of ``docs/howto/install.md``."""
     show_functions()
     warm_up(load_task("ascending"))
     print(f"{'experiment':20}{'one run':>12}{f'{SLOTS} runs':>12}   microseconds of a core a trial")
@@ -46,7 +47,7 @@ HEAD = "| µs a trial |"
 
 
 def show_functions() -> None:
-    """Print the time of a trial by each public function, and write the table of the page."""
+    """Print the time of a trial by each public function, and write the page's table."""
     columns = {name: functions(load_task(name)) for name in ("ascending", "two-armed-1")}
     rounds: dict[str, list[dict[str, float]]] = {name: [] for name in columns}
     for _ in range(ROUNDS):  # in turn, so that other work of the machine slows all functions
@@ -66,10 +67,10 @@ def show_functions() -> None:
 
 
 def functions(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
-    """Return, by name, the number of trials that a function makes, and the function.
+    """Return, by name, a number of trials and a function that makes them.
 
-    The targets are near the solution of CMA-ES, so that few goals are missed. Those of environments
-    are near the postures of the corrective process.
+    The targets are near the solution of CMA-ES, so that few goals are missed. The actions of
+    environments are near the postures of the corrective process instead.
     """
     session = Session(task, 0, CMAES.information)
     solution = CMAES(CMAES.Parameters(trials=3000)).solve(session).solution
@@ -106,7 +107,10 @@ def functions(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
 
 
 def _us(trials: int, make: Callable[[], object]) -> float:
-    """Return the CPU time of a trial, in µs, of a function that makes ``trials`` trials."""
+    """Return the CPU time of a trial, in µs, of a function that makes trials.
+
+    The function ``make`` makes ``trials`` trials.
+    """
     started = time.process_time()  # CPU time of all threads
     make()
     return (time.process_time() - started) / trials * 1e6

@@ -1,4 +1,4 @@
-"""Tune the policy gradient, and hill climbing that learns its spread, on development instances.
+"""Tune the policy gradient, and hill climbing with a learned spread, on development instances.
 
     python docs/scripts/tune_rivals.py results/tuning docs/stored/tuning
 
@@ -13,11 +13,12 @@ Rule, which was written before the runs:
 - The value of a run is the number of ticks of its answer: without noise of its best trial; with
   noise the mean of 100 executions with noise in which it has not practised. A failed execution, and
   a run that fails, count as twice the ticks of the corrective process with its best hands.
-- The setting with the least mean of the logarithm of this value, over families and worlds, becomes
-  the default in both worlds.
+- The setting with the smallest mean of the logarithm of this value, over families and worlds,
+  becomes the default in both worlds.
 
-Each run is a row of results/tuning/runs.csv as soon as it is made. Runs that are there are not made
-again: remove the file after a change of a method. From these rows the script writes rivals.csv.
+Each run is written as a row into results/tuning/runs.csv as soon as it is made. Runs in this file
+are not made again; remove the file after a change of a method. From these rows, the script writes
+rivals.csv.
 """
 
 import itertools
@@ -54,7 +55,8 @@ GRIDS = {
         "step": (1.0, 2.0, 4.0, 8.0),
     },
 }
-"""Values of the parameters that are tuned, by method and parameter ``spread``."""
+"""Maps each method and its value of the parameter ``spread`` to a grid: the values of each
+parameter that is tuned."""
 KEYS = ["run", "method", "spread", "setting", "family", "instance", "motor_noise"]
 
 
@@ -69,7 +71,7 @@ def planned():
 
 
 def ticks_of(key):
-    """Make a run, and return the value of its answer, in ticks."""
+    """Make the run of a key (:data:`KEYS`), and return its value in ticks."""
     run, name, spread, setting, family, instance, noise = key
     method = built_in_methods()[name]
     grid = GRIDS[name, spread]
@@ -90,7 +92,10 @@ def ticks_of(key):
 
 
 def make_runs(file):
-    """Make the runs that a CSV file lacks, and append a row for each as soon as it is made."""
+    """Make the runs that a CSV file lacks, and append their rows.
+
+    Each row is appended as soon as its run is made.
+    """
     done = set()
     if file.is_file():
         done = {*pd.read_csv(file)[KEYS].itertuples(index=False, name=None)}
@@ -106,8 +111,11 @@ def make_runs(file):
 
 
 def table_of(runs):
-    """Return a row for each setting, the best of each method first: the mean logarithm of ticks,
-    and geometric means of ticks over all runs, in each world and in each family."""
+    """Return a frame with a row for each setting, a method's best setting first.
+
+    A row has the mean logarithm of ticks, and the geometric means of ticks over all runs, over the
+    runs in each world, and over the runs in each family.
+    """
     runs = runs.assign(log=np.log(runs.ticks), noise="noise=" + runs.motor_noise.astype(str))
     kinds = ["method", "spread", "setting"]
     means = runs.groupby(kinds).log.mean()
@@ -124,7 +132,10 @@ def table_of(runs):
 
 
 def main():
-    """Make the runs that are missing in the first folder, and write the table into the second."""
+    """Make the missing runs, and write the table of settings.
+
+    The command line names two folders: that of the runs, and that of the table.
+    """
     os.nice(15)
     folder, stored = map(Path, sys.argv[1:])
     folder.mkdir(parents=True, exist_ok=True)

@@ -1,10 +1,13 @@
-"""Judge the claims of a study by tests that are corrected over all its claims.
+"""Judge the claims of a study, with p-values adjusted over all claims.
 
-A claim says that a mean over tasks, or each of several means, lies beyond a bound
-(:func:`mean_beyond`, joined by :func:`all_of`). :func:`judge` corrects the tests of all claims of a
-study together (Holm). A claim that holds stays undecided if its tests are not significant without
-the task that favours it most. If values over tasks are very skewed, p must be below 1 %
-(:func:`level_of`).
+A claim says that a mean over tasks lies beyond a bound (:func:`mean_beyond`), or that each of
+several means does (:func:`all_of`). :func:`judge` adjusts the p-values of all claims of a study
+together, by Holm's method. Two rules make verdicts stricter:
+
+- A claim that holds is undecided if its tests are not significant without the task that favours the
+  claim most.
+- If the values over tasks are very skewed, the level of significance is 1 % instead of 5 %
+  (:func:`level_of`).
 """
 
 from __future__ import annotations
@@ -28,21 +31,22 @@ from coartic.analysis.words import p_value
 from coartic.estimates import LEVEL, MIN_TASKS, MIN_VALUES, Estimate
 
 RESAMPLES_OF_CLAIMS = 99_999
-"""Resamples of a test over tasks, whose p-value is corrected over many claims."""
+"""Number of bootstrap samples of a test over tasks. It is large, because p-values are adjusted over
+many claims."""
 STRICT_LEVEL = 0.01
-"""Level of a test whose values over tasks are very skewed."""
+"""Level of significance of a test whose values over tasks are very skewed."""
 MAX_SKEWNESS = 2.0
-"""Largest absolute skewness of values over tasks at which the level of their test is 5 %."""
+"""Largest absolute skewness of values over tasks for which the level of significance is 5 %."""
 SIGNS = {"greater": 1.0, "less": -1.0}
 Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
 Side = Literal["greater", "less"]
 
 
 def level_of(values: ArrayLike) -> float:
-    """Return the level at which a test of the mean of values over tasks counts as significant.
+    """Return the level of significance for a test of a mean over tasks.
 
-    A bootstrap test of a mean rejects a true hypothesis too often if values are very skewed
-    (``docs/statistics.md``).
+    The level is 5 %, or 1 % for skewed values. A bootstrap test of a mean rejects a true null
+    hypothesis too often if the values are very skewed (``docs/statistics.md``).
 
     Parameters
     ----------
@@ -52,8 +56,8 @@ def level_of(values: ArrayLike) -> float:
     Returns
     -------
     float
-        0.01 if the absolute skewness of the values exceeds 2, otherwise 0.05. It is compared with
-        p after correction.
+        0.01 if the absolute skewness of the values exceeds 2, otherwise 0.05. The adjusted p-value
+        is compared with it.
 
     Examples
     --------
@@ -67,38 +71,52 @@ def level_of(values: ArrayLike) -> float:
 
 @dataclass(frozen=True)
 class Finding:
-    """Evidence and tests of one claim, before correction for multiple tests."""
+    """Evidence and tests of one claim, before p-values are adjusted for multiple tests."""
 
     holds: bool | None
-    """True if the runs show the claim; None if the runs are too few."""
+    """True if the means lie where the claim says, otherwise False. It is None if there are too few
+    tasks to judge the claim."""
     evidence: str
-    """Sentence with the means and their intervals, or why the claim cannot be judged."""
+    """Sentence with the means and their intervals, or with the reason why the claim cannot be
+    judged."""
     tests: tuple[Estimate, ...] = ()
-    """Tests of the claim, which must all hold. A positive estimate is as claimed."""
+    """Tests of the claim. All of them must be significant. A positive estimate is in the direction
+    of the claim."""
     against: tuple[Estimate, ...] = ()
-    """Tests of the opposite of the claim. A claim that does not hold is refuted if one of them has
-    p below the ``level`` after correction."""
+    """Tests of the opposite of the claim. A claim that does not hold is refuted if the adjusted
+    p-value of one of these tests is below ``level``."""
     without: tuple[Estimate, ...] = ()
-    """Tests of the claim over tasks, each without the task that favours the claim most."""
+    """The same tests of the claim, each without the task that favours the claim most."""
     level: float = LEVEL
-    """Level of the tests: the smallest :func:`level_of` of the values that they test."""
+    """Level of significance of the tests: the smallest :func:`level_of` of the tested values."""
 
     @property
     def opposite_p(self) -> float:
-        """Return the smallest p-value in ``against``, corrected by Bonferroni; NaN without one."""
+        """Bonferroni-adjusted p-value of the opposite of the claim; NaN without a p-value.
+
+        It is the smallest p-value of the tests in ``against``, multiplied by the number of tests
+        with a p-value, but at most 1.
+        """
         tested = [test.p for test in self.against if not math.isnan(test.p)]
         return min(1.0, min(tested) * len(tested)) if tested else math.nan
 
     def verdict(self, p: float, opposite_p: float) -> Verdict:
-        """Return the verdict for p-values of the claim and of its opposite.
+        """Return the verdict on the claim.
 
-        - *supported*: the claim holds, and ``p`` is below the ``level`` or NaN. (It is NaN if the
-          claim was counted exactly.)
-        - *not supported*: the claim does not hold, and ``opposite_p`` is below the ``level``. The
-          verdict is also *not supported* if the claim has no test, or if a test of five or more
-          values has no p and no positive estimate, because all values are equal.
+        - *supported*: the claim holds, and ``p`` is below ``level``, or is NaN because the claim
+          was counted exactly.
+        - *not supported*: the claim does not hold, and one of these is true: ``opposite_p`` is
+          below ``level``; the claim has no test; a test of at least five values has no p-value and
+          an estimate that is not positive, because all its values are equal.
         - *undecided*: any other claim. A claim that holds is also undecided if one of its tests has
-          fewer than five values and no p.
+          fewer than five values and no p-value.
+
+        Parameters
+        ----------
+        p : float
+            Adjusted p-value of the claim; NaN without a test.
+        opposite_p : float
+            Adjusted p-value of the opposite of the claim; NaN without a test.
         """
         untested = any(math.isnan(test.p) and min(test.n) < MIN_VALUES for test in self.tests)
         if self.holds is None or (self.holds and untested):
@@ -114,15 +132,16 @@ class Finding:
 
 
 def _largest_p(tests: Iterable[Estimate]) -> float:
-    """Return the largest p-value of tests that must all hold; NaN without a p-value."""
+    """Return the largest p-value of tests that must all be significant; NaN without a p-value."""
     return max((test.p for test in tests if not math.isnan(test.p)), default=math.nan)
 
 
 def _tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
-    """Test that the mean over tasks exceeds a bound, with and without the largest value.
+    """Test whether the mean over tasks exceeds a bound, with and without the largest value.
 
-    ``values`` has one value for each task, for at least two tasks. p is NaN for a test of a single
-    value.
+    ``values`` has one value for each task, shape ``(tasks,)``, for at least two tasks. The first
+    test has all values, and the second test leaves out the largest value. A p-value is NaN for a
+    test of a single value.
     """
     by_task = np.asarray(values, dtype=np.float64)
     others = np.delete(by_task, by_task.argmax())
@@ -135,36 +154,37 @@ def _tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estima
 def mean_beyond(
     sentence: str, values: ArrayLike, bound: float = 0.0, side: Side = "greater"
 ) -> Finding:
-    """Test whether the mean over tasks lies beyond a bound, by a one-tailed bootstrap test.
+    """Test whether a mean over tasks lies beyond a bound, by a one-sided bootstrap test.
 
     Parameters
     ----------
     sentence : str
-        Sentence of the evidence, with one ``{}`` for the mean and its interval. Other braces stay
-        as they are.
+        Beginning of the evidence, with exactly one ``{}``, which is replaced by the mean with its
+        interval. Other braces are kept.
     values : array_like, shape (tasks,)
-        One value for each task. NaN stands for a task without a value and does not count.
+        One value for each task. A task without a value has NaN and does not count.
     bound : float
         The bound, in the unit of the values.
     side : {"greater", "less"}
-        Side of the bound on which the mean is claimed to lie.
+        Side on which the mean is claimed to lie: above or below the bound.
 
     Returns
     -------
     Finding
-        ``holds`` is True if the mean lies on this side, and None, without a test, if there are
-        fewer than three tasks. ``tests`` has the test of the claim, and ``without`` the same test
-        without the task that favours the claim most. ``against`` has the test of the opposite:
-        with all tasks or without the task that favours the opposite most, whichever has the
-        larger p.
+        - ``holds`` is True if the mean lies on the claimed side. It is None, and there are no
+          tests, if there are values for fewer than three tasks.
+        - ``tests`` has the test of the claim.
+        - ``without`` has the same test without the task that favours the claim most.
+        - ``against`` has the test of the opposite of the claim. It is made with all tasks, and
+          without the task that favours the opposite most; the test with the larger p-value counts.
 
     Raises
     ------
     CoarticError
-        If ``side`` is unknown, ``values`` is not one-dimensional, or ``sentence`` does not have
+        ``side`` is unknown, ``values`` is not one-dimensional, or ``sentence`` does not have
         exactly one ``{}``.
     ValueError
-        If there are three values or more, and one of them or the bound is not finite.
+        There are values for at least three tasks, and a value or the bound is not finite.
 
     Examples
     --------
@@ -173,12 +193,17 @@ def mean_beyond(
     (True, 'Planning saves 5.50 ticks (4 tasks)')
     """
     if sentence.count("{}") != 1:
-        raise CoarticError(f"sentence {sentence!r} must have exactly one {{}}, for the mean")
+        raise CoarticError(
+            f"sentence {sentence!r} has {sentence.count('{}')} {{}}; it must have exactly one, for "
+            "the mean"
+        )
     if side not in SIGNS:
-        raise CoarticError(f"side must be 'greater' or 'less', not {side!r}")
+        raise CoarticError(f"side is {side!r}; it must be 'greater' or 'less'")
     found = np.asarray(values, dtype=np.float64)
     if found.ndim != 1:
-        raise CoarticError(f"values have shape {found.shape}; they need one value for each task")
+        raise CoarticError(
+            f"values has shape {found.shape}; it must be (tasks,), with one value for each task"
+        )
     found = found[~np.isnan(found)]
     if len(found) < MIN_TASKS:
         return Finding(None, f"fewer than {MIN_TASKS} random tasks can be judged")
@@ -191,23 +216,24 @@ def mean_beyond(
 
 
 def all_of(*findings: Finding) -> Finding:
-    """Join the findings that a claim needs together.
+    """Join several findings into the finding on a claim that needs all of them.
 
     Parameters
     ----------
     *findings : Finding
-        Findings of :func:`mean_beyond`.
+        Findings of :func:`mean_beyond`, at least one.
 
     Returns
     -------
     Finding
-        A finding that holds if all findings hold, with the tests of all of them. If a finding has
-        too few runs (``holds`` is None), the first such finding is returned.
+        A finding that holds if all findings hold. It has the tests and the evidence of all of them,
+        and the smallest of their levels. If a finding has too few tasks (``holds`` is None), the
+        first such finding is returned instead.
 
     Raises
     ------
     CoarticError
-        If there are no findings.
+        There are no findings.
 
     Examples
     --------
@@ -216,7 +242,7 @@ def all_of(*findings: Finding) -> Finding:
     'fewer than 3 random tasks can be judged'
     """
     if not findings:
-        raise CoarticError("all_of needs at least one finding")
+        raise CoarticError("findings is empty; all_of needs at least one finding")
     for finding in findings:
         if finding.holds is None:
             return finding
@@ -231,26 +257,26 @@ def all_of(*findings: Finding) -> Finding:
 
 
 def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
-    """Judge the claims of a study, with tests corrected over all claims (Holm).
+    """Judge the claims of a study, with p-values that are Holm-adjusted over all claims.
 
     Parameters
     ----------
     claims : mapping of str to (str, str, Finding)
         Maps the id of each claim to its statement, its test in words, and its finding. A claim
-        without a p-value still counts in the correction.
+        without a p-value counts in the adjustment, too.
 
     Returns
     -------
     DataFrame
-        One row for each claim, by its id, with the columns ``statement``, ``verdict``,
-        ``evidence``, ``test`` and three corrected p-values (NaN without a test):
+        A row for each claim, indexed by its id, with the columns ``statement``, ``verdict``,
+        ``evidence``, ``test`` and three adjusted p-values (NaN without a test):
 
-        - ``p_holm`` of the claim;
-        - ``p_without`` of the claim with all tasks or without the task that favours it most,
-          whichever is larger;
-        - ``opposite_p_holm`` of the opposite of the claim.
+        - ``p_holm``: p-value of the claim;
+        - ``p_without``: p-value of the claim with all tasks, or without the task that favours the
+          claim most, whichever is larger;
+        - ``opposite_p_holm``: p-value of the opposite of the claim.
 
-        The verdict is :meth:`Finding.verdict` of the last two.
+        The verdict is decided by ``p_without`` and ``opposite_p_holm`` (:meth:`Finding.verdict`).
 
     Examples
     --------
@@ -286,29 +312,35 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
 
 
 def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
-    """Judge claims whose words and bounds are in a file, as :func:`judge` does.
+    """Judge claims whose words and bounds are in a TOML file (:func:`judge`).
 
     Parameters
     ----------
     words : str or pathlib.Path
-        TOML file with a table for each claim, by its id. ``text`` is the claim, ``test`` the test
-        in words, and ``means`` a list of tables. Each table has a ``sentence`` and one bound: the
-        mean is claimed to lie ``above`` it, ``below`` it, or ``within`` plus and minus it.
-    values : mapping
-        Maps the id of each claim to a list with one entry for each of its means. An entry has one
-        value for each task, or is a dict that maps groups of tasks to such values. With groups the
-        mean of each group must lie beyond the bound, and the sentence may contain ``{group}``.
+        TOML file with a table for each claim, named by the id of the claim. It has
+
+        - ``text``: the claim;
+        - ``test``: the test in words;
+        - ``means``: a list of tables, one for each mean. Such a table has a ``sentence``
+          (:func:`mean_beyond`) and one bound: ``above`` if the mean is claimed to lie above the
+          bound, ``below`` if it is claimed to lie below, or ``within`` if its absolute value is
+          claimed to lie below.
+    values : mapping of str to sequence
+        Maps the id of each claim to a list with an entry for each of its means. An entry is an
+        array with one value for each task, or a dict that maps names of groups of tasks to such
+        arrays. With groups, the mean of each group must lie beyond the bound, and the sentence may
+        contain ``{group}`` for the name of the group.
 
     Returns
     -------
     DataFrame
-        The table of :func:`judge`, with the claims of ``values``, in their order.
+        The table of :func:`judge`, with the claims of ``values`` in their order.
 
     Raises
     ------
     CoarticError
-        If the file has no such claim, if a claim has no ``text``, ``test`` or ``means``, or if a
-        claim has more or fewer means than ``values``.
+        The file lacks a claim of ``values``, a claim has no ``text``, ``test`` or ``means``, or the
+        file and ``values`` have different numbers of means for a claim.
 
     Examples
     --------
@@ -324,15 +356,17 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
     claims, of_file = {}, tomllib.loads(Path(words).read_text("utf-8"))
     for name, means in values.items():
         if name not in of_file:
-            raise CoarticError(f"{words} has no claim {name!r}")
+            raise CoarticError(f"{words} has no claim {name!r}; it has {', '.join(of_file)}")
         claim = of_file[name]
         if missing := [key for key in ("text", "test", "means") if key not in claim]:
-            raise CoarticError(f"{words}: claim {name} has no {missing[0]}")
+            raise CoarticError(
+                f"{words}: claim {name!r} has no {missing[0]}; it needs text, test and means"
+            )
         by_group = [entry if isinstance(entry, Mapping) else {"": entry} for entry in means]
         if len(claim["means"]) != len(by_group):
             raise CoarticError(
-                f"{words}: claim {name} has {len(claim['means'])} means, but values has "
-                f"{len(by_group)} of them"
+                f"{words}: claim {name!r} has {len(claim['means'])} means, but values has "
+                f"{len(by_group)} for it; both must have the same number"
             )
         asked = [*zip(claim["means"], by_group, strict=True)]
         groups = dict.fromkeys(group for values_of in by_group for group in values_of)
@@ -345,7 +379,10 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
 
 
 def _mean_as_asked(asked: Mapping[str, Any], group: str, values: Any) -> Finding:
-    """Return the finding on the values of a group, as a file asks (:func:`judge_means`)."""
+    """Return the finding on one mean of a claim, for one group of tasks (:func:`judge_means`).
+
+    ``asked`` is the table of the mean in the TOML file, and ``values`` has a value for each task.
+    """
     sentence = asked["sentence"].replace("{group}", group)
     if "within" in asked:
         above = mean_beyond(sentence, values, -asked["within"])

@@ -1,4 +1,4 @@
-"""Write the tables and the page of a study, and a suite of its missing control runs."""
+"""Write a study's tables and page, and a suite of its missing control runs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _OF_RUN = [
 
 
 def tabulate_runs(study: Study) -> pd.DataFrame:
-    """Return a table of a study's runs and their signatures of coarticulation.
+    """Return a table of a study's runs with their signatures of coarticulation.
 
     Parameters
     ----------
@@ -37,10 +37,10 @@ def tabulate_runs(study: Study) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row for each run: task, method, seed, rewards (in negative ticks), hands, and signatures
-        of the solution (``first``, ``arm``, ...). If runs have a replay, a noiseless trial after
-        learning, the frame also has its signatures (``replay_first``, ...). Columns without a value
-        are left out.
+        A row for each run, indexed by its id: task, method, seed, rewards (negative ticks), hands,
+        and the signatures of the solution (``first``, ``arm``, ...). If at least one run has a
+        replay, which is a trial without noise after learning, the frame also has the signatures of
+        replays (``replay_first``, ...). Columns without a value are left out.
     """
     runs = study.runs[_OF_RUN].assign(
         **{each.column: study.signature(name) for name, each in SIGNATURES.items()}
@@ -60,20 +60,21 @@ def write_study(
     Parameters
     ----------
     folder : str or pathlib.Path
-        The study's folder, with a template ``README.md.jinja``. :func:`fill_page` makes the page
-        ``README.md`` from it and from all CSV files of the folder, each a table named like its
-        file.
-    tables : dict
-        Tables by name. Table ``results`` becomes ``results.csv``. Table ``runs``, which the page
-        does not read, becomes ``runs.csv.xz``. Other CSV files of the folder stay as they are.
+        The study's folder, which must have a template ``README.md.jinja``. The page ``README.md``
+        is made from this template and from all CSV files of the folder (:func:`fill_page`). In the
+        template, a CSV file is a table with the name of the file.
+    tables : dict of str to DataFrame
+        Maps the name of each table to the table. Each table is written into a file of its name,
+        such as ``results.csv``. Table ``runs`` is compressed into ``runs.csv.xz``, which the page
+        does not read. Other CSV files of the folder are kept.
     draw : callable
-        Function of table ``results``, as read from its file, that returns the figure (Matplotlib)
-        to be written as ``figure.svg``.
+        Function that draws the figure, written as ``figure.svg``. Its argument is table
+        ``results``, as read from its file, and it returns a Matplotlib figure.
 
     Raises
     ------
     CoarticError
-        If the folder has no template, or there is neither ``results.csv`` nor a table ``results``.
+        The folder has no template, or neither the folder nor ``tables`` has ``results``.
 
     Examples
     --------
@@ -85,29 +86,31 @@ def write_study(
     """
     folder = Path(folder)
     if not (folder / PAGE).is_file():
-        raise CoarticError(f"{folder} has no {PAGE}, so it is not the folder of a study")
+        raise CoarticError(f"{folder} has no template {PAGE}; the study's folder needs it")
     for name, table in tables.items():
         file = f"{name}.csv{'.xz' if name == 'runs' else ''}"
         table.to_csv(folder / file, float_format="%.6g")
     stored = {path.stem: pd.read_csv(path, index_col=0) for path in folder.glob("*.csv")}
     if "results" not in stored:
-        raise CoarticError(f"{folder} has no results.csv, and there is no table 'results'")
+        raise CoarticError(
+            f"{folder} has no results.csv, and tables has no 'results'; one of the two is needed"
+        )
     (folder / "figure.svg").write_bytes(stored_picture(draw, stored["results"]))
     page = fill_page(folder / PAGE, **stored)
     (folder / "README.md").write_text(page, encoding="utf-8")
 
 
 def stored_picture(draw: Callable[..., Any], *arguments: Any, **options: Any) -> bytes:
-    """Return a figure as SVG in the font that Matplotlib brings along.
+    """Draw a figure in the font that comes with Matplotlib, and return it as SVG.
 
-    Stored figures have this font, so that they are the same on every machine.
+    The font makes stored figures the same on every machine.
 
     Parameters
     ----------
     draw : callable
-        Function that returns the figure (Matplotlib).
+        Function that returns a Matplotlib figure.
     *arguments, **options
-        Arguments of ``draw``.
+        Arguments with which ``draw`` is called.
 
     Returns
     -------
@@ -119,16 +122,20 @@ def stored_picture(draw: Callable[..., Any], *arguments: Any, **options: Any) ->
 
 
 def fill_page(template: str | Path, **values: Any) -> str:
-    """Return a page that a Jinja template makes from tables and numbers.
+    """Fill in a Jinja template with tables and numbers, and return the page.
 
     Parameters
     ----------
     template : str or pathlib.Path
-        A Jinja template. The template can call ``interval(row, column, digits, scale)``, which
-        writes ``7.8 [7.3, 8.1]``, and ``expect(holds, what)``, use the filters ``number``,
-        ``p_value`` and ``listed``, and include templates of the same folder.
+        File of the template. In the template you can
+
+        - call ``interval(row, column, digits, scale)``, which writes ``7.8 [7.3, 8.1]``
+          (:func:`coartic.analysis.interval`);
+        - call ``expect(holds, what)``, which stops if a condition is false (:func:`expect`);
+        - use the filters ``number``, ``p_value`` and ``listed``;
+        - include templates of the same folder.
     **values
-        Tables, numbers and functions, by the names that the template uses.
+        Tables, numbers and functions. The name of each argument is its name in the template.
 
     Returns
     -------
@@ -138,12 +145,12 @@ def fill_page(template: str | Path, **values: Any) -> str:
     Raises
     ------
     CoarticError
-        If there is no such template, or ``interval`` or ``number`` gets a wrong argument, such as
-        a row without the numbers.
+        The template does not exist, or ``interval`` or ``number`` gets a wrong argument, such as a
+        row without the numbers.
     ValueError
-        If a condition of ``expect`` is false, or ``listed`` gets no words.
+        A condition of ``expect`` is false, or ``listed`` gets no words.
     jinja2.TemplateError
-        If the template is wrong or uses an unknown name.
+        The template has an error, or uses an unknown name.
     """
     template = Path(template)
     if not template.is_file():
@@ -161,9 +168,24 @@ def fill_page(template: str | Path, **values: Any) -> str:
 
 
 def expect(holds: bool, what: str) -> str:
-    """Return an empty string if the condition ``holds`` of a sentence of the page is true.
+    """Stop making a page if one of its sentences is no longer true.
 
-    Raises ValueError with the words ``what`` if it is false.
+    Parameters
+    ----------
+    holds : bool
+        The condition under which the sentence is true.
+    what : str
+        The condition in words, for the error message.
+
+    Returns
+    -------
+    str
+        The empty string, which a template can print.
+
+    Raises
+    ------
+    ValueError
+        ``holds`` is false.
     """
     if not holds:
         raise ValueError(f"this no longer holds: {what}")
@@ -171,26 +193,27 @@ def expect(holds: bool, what: str) -> str:
 
 
 def control_suite(study: Study, *, runs: int = 20) -> str:
-    """Return a suite with the runs of random search that a study lacks as controls of signatures.
+    """Return a suite of random search that a study needs as control of signatures.
 
-    The suite has random search for each method that can select its solution by rewards, on each
-    task, with as many trials as the method. The idle arm has noise if the method adds noise to it.
-    There is a block for each hand sequence that at least a tenth of the method's solved runs have.
-    Controls that the study already has are left out. The control of signature ``hand`` (random
-    search that tries all hand sequences) is not in the suite.
+    For each method that can select its solution from trials, and each task, the suite has a block
+    for each hand sequence that at least a tenth of the method's solved runs have. In this block,
+    random search has this hand sequence and the method's number of trials, and adds noise to the
+    idle arm if the method does. Controls that the study already has are left out. The control of
+    the signature ``hand``, which is random search that tries all hand sequences, is not in the
+    suite.
 
     Parameters
     ----------
     study : Study
-        Results with learners.
+        Results with runs of learners.
     runs : int
-        Runs of each cell.
+        Number of runs of each cell.
 
     Returns
     -------
     str
-        The suite as TOML; empty if nothing is missing. Write it to a file and run it with the
-        results of the study: ``coartic run control.toml --include FOLDER``.
+        The suite as TOML; the empty string if no control is missing. Write it into a file and run
+        it together with the results of the study: ``coartic run control.toml --include FOLDER``.
     """
     blocks = dict[tuple[str, str, int, bool], None]()
     for (task, label), of_method in study.cells.items():

@@ -73,12 +73,18 @@ def take_proof(known, row):
     if row["reward"] > entry["reward"]:
         execution = execute(load_task(row["task"]), movements_of(row["solution"]))
         if (execution.reward, execution.hands) != (row["reward"], row["hands"]):
-            raise CoarticError(f"{row['task']}: the solution does not come to {row['reward']}")
+            raise CoarticError(
+                f"{row['task']}: the solution has reward {execution.reward} with hands "
+                f"{execution.hands}; it must have {row['reward']} with {row['hands']}"
+            )
         entry |= {key: row[key] for key in ("reward", "hands", "solution")}
         if "searches" in entry:
             entry["searches"] |= {"studies/optima": row["reward"]}
     if row["bound"] < entry["reward"]:
-        raise CoarticError(f"{row['task']}: bound {row['bound']} is below {entry['reward']}")
+        raise CoarticError(
+            f"{row['task']}: bound is {row['bound']}; it must not be below the reward "
+            f"{entry['reward']}"
+        )
     if before[1] is None or row["bound"] < before[1]:
         entry |= {"bound": row["bound"], "nodes": row["nodes"]}
     return before != (entry["reward"], entry["bound"])
@@ -148,7 +154,9 @@ def solution_in_short(task, movements, reward):
             content.append([each.goal, each.hand, each.kind, *short])
         if execute(task, movements_of(content)).reward == reward:
             return content
-    raise CoarticError(f"{task.name}: the solution does not come to {reward}")
+    raise CoarticError(
+        f"{task.name}: the solution does not have reward {reward}, at any number of decimals"
+    )
 
 
 def movements_of(content):

@@ -77,15 +77,18 @@ def contexts_of(table):
     for target, of_target in table.groupby("target"):
         others = [each for each in of_target.context.unique() if each != REST]
         if len(others) > 1:
-            raise ValueError(f"target {target} has the contexts {', '.join(others)}, not one")
+            raise ValueError(
+                f"target {target} has the contexts {', '.join(others)}; it must have one besides "
+                f"{REST}"
+            )
         for person, of_person in of_target.groupby("person"):
             both = [postures(of_person[of_person.context == each]) for each in (*others, REST)]
             if len(both) == 2 and min(map(len, both)) > 1:
                 contexts.setdefault(target, {})[person] = both
     if not contexts:
         raise ValueError(
-            f"nobody has a target in two contexts, another target and rest ({REST}), with two "
-            "repeats each"
+            "the table has no person and target with two contexts; at least one needs two repeats "
+            f"in which another target follows, and two in which rest ({REST}) follows"
         )
     return contexts
 
@@ -158,8 +161,9 @@ def people(rows):
     applies = rows.dropna(subset="more")
     if applies.empty:
         raise ValueError(
-            f"no lean applies: the next postures are {rows.apart.median():.2g} rad apart, and need "
-            "0.1 rad and three standard errors. Are the angles in degrees?"
+            "the lean is not applicable to any person and target: the mean next postures are "
+            f"{rows.apart.median():.2g} rad apart (median), and must be at least 0.1 rad and three "
+            "standard errors apart. Are the angles in degrees?"
         )
     numbers = ["more", "at_end", "at_start", "difference", "apart"]
     found = applies.groupby("person")[numbers].mean()

@@ -113,8 +113,8 @@ def test_words_and_bounds_of_claims_are_of_a_file(tmp_path):
         assert (within.verdict, within.evidence.count("tasks")) == (verdict, 1)
     with pytest.raises(CoarticError, match="claims.toml has no claim 'beyond'"):
         judge_means(words, {"beyond": [first]})
-    with pytest.raises(CoarticError, match="between has 1 means, but values has 2"):
+    with pytest.raises(CoarticError, match="'between' has 1 means, but values has 2"):
         judge_means(words, {"between": [first, first]})
     words.write_text("[between]\ntext = 'It is.'\nmeans = []")
-    with pytest.raises(CoarticError, match="claim between has no test"):
+    with pytest.raises(CoarticError, match="claim 'between' has no test"):
         judge_means(words, {"between": []})

@@ -104,7 +104,7 @@ def test_a_table_without_contexts_is_refused(tmp_path):
     table = stored()
     with pytest.raises(ValueError, match="column context is missing"):
         written(table.drop(columns="context"), tmp_path)
-    with pytest.raises(ValueError, match="in two contexts"):
+    with pytest.raises(ValueError, match="no person and target with two contexts"):
         RULES.contexts_of(written(table[table.context == "R"], tmp_path))
     with pytest.raises(ValueError, match="target 1 has the contexts"):
         RULES.contexts_of(written(table.replace({"target": {9: 1}}), tmp_path))
@@ -117,7 +117,7 @@ def test_a_person_with_a_single_repeat_is_left_out(tmp_path):
     table = stored()
     single = table[(table.person != 3) | (table.repeat == 1)]
     assert RULES.people(RULES.leans(RULES.contexts_of(written(single, tmp_path)))).shape[0] == 6
-    with pytest.raises(ValueError, match="two repeats each"):
+    with pytest.raises(ValueError, match="no person and target with two contexts"):
         RULES.contexts_of(written(table[table.repeat == 1], tmp_path))
 
 
