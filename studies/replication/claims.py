@@ -1,7 +1,7 @@
 """Judge the paper's claims by two verdicts each, with tests that are corrected together.
 
-``docs/statistics.md`` explains the verdicts. Exact counts, and values without spread over runs, need
-no test. A claim that a folder cannot test still counts in the correction of its group, so that
+``docs/statistics.md`` explains the verdicts. Exact counts, and values without spread over runs,
+need no test. A claim that a folder cannot test still counts in the correction of its group, so that
 verdicts do not depend on the other runs of a folder.
 """
 
