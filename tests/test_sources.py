@@ -40,6 +40,7 @@ def test_each_shipped_table_is_listed_once():
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table["files"][0])
 def test_program_and_pages_exist(table):
     assert (ROOT / table["program"]).is_file()
+    assert table["source"] in ("", "comparison", "families", "shipped", "rows")
     assert table["pages"]
     assert [page for page in table["pages"] if not (ROOT / page).is_file()] == []
 
