@@ -17,10 +17,11 @@ import re
 import shutil
 import tempfile
 import tomllib
+from collections import Counter
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import finding_figures
 import pandas as pd
@@ -30,7 +31,6 @@ from coartic.analysis import FIGURES, TABLES, Study, by_task, load, mean
 from coartic.analysis.statistics import task_mean
 from coartic.runs.shipped import PACKED, SHIPPED, SHIPPED_FOLDER, shipped_hashes
 from coartic.runs.store import RUNS_FILE
-from common.judging import Verdict
 from common.writing import fill_page, stored_picture
 from worlds.settings import FAMILIES, WORLDS
 
@@ -102,8 +102,8 @@ def cells_of_the_paper() -> pd.DataFrame:
     return rewards[rewards.hands.isna()]
 
 
-def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]:
-    """Return how many claims about the paper's tasks have each verdict.
+def verdicts(*, others: bool = False, published: bool = False) -> Counter[str]:
+    """Return the number of claims about the paper's tasks for each verdict.
 
     The result is a dict that maps each verdict to the number of claims. If ``others`` is True, the
     three claims that carry the main point of the paper are left out. If ``published`` is True,
@@ -116,8 +116,7 @@ def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]
     if others:
         words = tomllib.loads((STUDIES / "replication" / "claims.toml").read_text("utf-8"))
         judged = judged[["short" not in words[name] for name in judged.index]]
-    counts = judged.replicates.value_counts()
-    return {verdict: int(counts.get(verdict, 0)) for verdict in get_args(Verdict)}
+    return Counter(judged.replicates)
 
 
 def seen(evidence: str, words: str, which: int = 0) -> str:
@@ -284,8 +283,7 @@ def in_worlds(claim: str) -> str:
 
 def filled_pages() -> dict[str, str]:
     """Fill in all templates, and return the pages by path below ``docs``."""
-    replication = STUDIES / "replication"
-    published = tomllib.loads((replication / "published.toml").read_text("utf-8"))
+    published = tomllib.loads((STUDIES / "replication" / "published.toml").read_text("utf-8"))
     values = {
         "table": table,
         "row": row,
@@ -301,8 +299,6 @@ def filled_pages() -> dict[str, str]:
         "foreign_gaps": foreign_gaps,
         "shipped_gaps": shipped_gaps,
         "published": published["general"],
-        "readings": table("reconstruction", "readings"),
-        "goal_sets": pd.read_csv(replication / "sets.csv"),
     }
     return {
         str(path.relative_to(DOCS).with_suffix("")): fill_page(path, **values)

@@ -10,8 +10,6 @@ from tests.support.processes import ROOT
 
 SOURCES = [ROOT / "docs" / "stored" / "SOURCES.toml", *sorted(ROOT.glob("studies/*/sources.toml"))]
 TABLES = [table for file in SOURCES for table in tomllib.loads(file.read_text("utf-8"))["tables"]]
-BEFORE = {"docs/stored/reconstruction/readings.csv", "studies/replication/sets.csv"}
-"""Tables of an earlier version, which the present code cannot make; their pages say so."""
 CODE = {name: info.code for name, info in built_in().items()}
 """Versions of model and method by the id of the method."""
 
@@ -41,18 +39,13 @@ def test_each_shipped_table_is_listed_once():
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table["files"][0])
 def test_program_and_pages_exist(table):
-    is_before = {*table["files"]} <= BEFORE
-    assert is_before == ("version" in table)
-    assert is_before or (ROOT / table["program"]).is_file()
+    assert (ROOT / table["program"]).is_file()
+    assert table["source"] in ("", "comparison", "families", "shipped", "rows")
     assert table["pages"]
     assert [page for page in table["pages"] if not (ROOT / page).is_file()] == []
 
 
-@pytest.mark.parametrize(
-    "table",
-    [table for table in TABLES if "version" not in table],
-    ids=lambda table: table["files"][0],
-)
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table["files"][0])
 def test_runs_are_of_the_present_versions(table):
     assert outdated(table["methods"]) == []
     for file in table["files"]:

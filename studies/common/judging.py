@@ -38,7 +38,7 @@ STRICT_LEVEL = 0.01
 MAX_SKEWNESS = 2.0
 """Largest absolute skewness of values over tasks for which the level of significance is 5 %."""
 SIGNS = {"greater": 1.0, "less": -1.0}
-Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
+Verdict = Literal["supported", "not supported", "undecided"]
 Side = Literal["greater", "less"]
 
 

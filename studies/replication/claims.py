@@ -1,9 +1,8 @@
 """Judge the paper's claims by two verdicts each, with tests that are corrected together.
 
-``docs/statistics.md`` explains the verdicts. The verdict *depends on the goals* uses ``sets.csv``.
-Exact counts, and values without spread over runs, need no test. A claim that a folder cannot test
-still counts in the correction of its group, so that verdicts do not depend on the other runs of a
-folder.
+``docs/statistics.md`` explains the verdicts. Exact counts, and values without spread over runs,
+need no test. A claim that a folder cannot test still counts in the correction of its group, so that
+verdicts do not depend on the other runs of a folder.
 """
 
 import tomllib
@@ -23,8 +22,6 @@ CLAIMS = pd.DataFrame.from_dict(
     tomllib.loads((HERE / "claims.toml").read_text("utf-8")), orient="index"
 ).fillna({"fitted": False, "short": ""})
 """A row for each claim, as ``claims.toml`` explains."""
-SETS = pd.read_csv(HERE / "sets.csv")
-"""Number of sets of goals, consistent with the paper's text, that support and refute a claim."""
 RULES = postures.RULES | hands.RULES | performance.RULES | families.RULES
 """Rules that say whether claims replicate, by id."""
 BEYOND = postures.BEYOND | hands.BEYOND | families.BEYOND
@@ -49,8 +46,6 @@ def judge_claims(study, names):
     judged, read = judge_rules(study, names, RULES, claims.test)
     compared = [name for name in names if name in BEYOND]
     beyond, read_beyond = judge_rules(study, compared, BEYOND, claims.test_beyond)
-    few = SETS.claim[2 * SETS.supported <= SETS.members]  # at most half of the sets support it
-    goals = judged.index.isin(few) & (judged.verdict == "supported")
     renamed = {"verdict": "more_than_one_selection", "evidence": "evidence_beyond",
                "test": "test_beyond", "p_holm": "p_beyond",
                "opposite_p_holm": "opposite_p_beyond"}  # fmt: skip
@@ -58,7 +53,7 @@ def judge_claims(study, names):
     run_ids = {name: [*read.get(name, ()), *read_beyond.get(name, ())] for name in names}
     return judged.assign(
         statement=judged.statement + claims.fitted.map({True: " †", False: ""}),
-        replicates=judged.verdict.mask(goals, "depends on the goals"),
+        replicates=judged.verdict,
         place=claims.place,
         quote=claims.quote,
         suite=[study.suite if name in read else "" for name in names],

@@ -8,8 +8,7 @@ from statistics import mode
 import numpy as np
 import scipy
 from comparisons import written
-from published import published_cell
-from reader import EC2, EC3, EC4, MARGINS, TASK_1, TASK_2, MissingError
+from reader import EC2, EC3, MARGINS, TASK_1, MissingError
 
 from coartic.analysis.statistics import share_test
 from coartic.estimates import Estimate, difference_of_means
@@ -102,32 +101,6 @@ def runs_that(read, task, label, what, does):
     return f"{who} {what}: {sum(does)} of {len(does)} runs ({each})"
 
 
-def half_find(read, task, label, hands):
-    """Test that neither few nor most runs learn these hands (:data:`MARGINS`).
-
-    The opposite is that their share differs from the published share.
-    """
-    does = [each == hands for each in read.hands(task, label)]
-    count, total = sum(does), len(does)
-    share = count / total
-    low, high = scipy.stats.binomtest(count, total).proportion_ci()
-    cell = published_cell(task, read.who(label))
-    published, of_published = cell[hands], sum(s.runs for of, s in cell.items() if of)
-    more = share_test(count, total, MARGINS.few, "greater")
-    fewer = share_test(count, total, MARGINS.most, "less")
-    inside = min(share - MARGINS.few, MARGINS.most - share)
-    within = Estimate(inside, n=(total,), p=max(more.p, fewer.p))
-    unlike = fisher_test(count, total, published.runs, of_published)
-    words = runs_that(read, task, label, hands, does)
-    return Finding(
-        MARGINS.few < share < MARGINS.most,
-        f"{words}, {low:.0%} to {high:.0%} of all (95 %); "
-        f"published {published.runs} of {of_published}{' (derived)' * published.derived_runs}",
-        (within,),
-        (unlike,),
-    )
-
-
 def no_reversal(read):
     """Test that the base only moves right in most runs that learn RRLR."""
     q0 = read.task(TASK_1).q0
@@ -137,16 +110,6 @@ def no_reversal(read):
     along = [np.append(q0[0], run.configurations[:, 0]) for run in runs]  # x of the base
     rightward = [bool((np.diff(x) > 0).all()) for x in along]
     return most_do(runs_that(read, TASK_1, EC2, "RRLR rightward", rightward), rightward)
-
-
-def ec4_mixed(read):
-    """Count the runs on two-armed task 2 that do not have the most common hand sequence.
-
-    The claim is that there are such runs. It is not tested. Raises MissingError without runs.
-    """
-    learned = read.hands(TASK_2, EC4)
-    others = [hands != mode(learned) for hands in learned]
-    return Finding(any(others), runs_that(read, TASK_2, EC4, "not commonest", others))
 
 
 def rail(read):
@@ -162,10 +125,7 @@ def rail(read):
 
 RULES = {
     "hand-coarticulation-task-1": hands_change,
-    "ec2-sequences": partial(half_find, task=TASK_1, label=EC2, hands="RRLR"),
     "no-reversal": no_reversal,
-    "half-choose-rlrr": partial(half_find, task=TASK_2, label=EC3, hands="RLRR"),
-    "ec4-mixed": ec4_mixed,
     "rail": rail,
 }
 """Rules by the ids of their claims."""

@@ -34,8 +34,6 @@ class Summary(NamedTuple):
     """Number of runs with the hand sequence, if the paper publishes it with the mean."""
     derived: bool = False
     """True if the reward is computed from other published numbers."""
-    derived_runs: bool = False
-    """True if the number of runs is computed from another published number."""
 
 
 def published_alone(task, kind):
@@ -73,7 +71,6 @@ def published_cell(task, condition):
                 entries.get(("sd", hands), {}).get("value"),
                 count.get("value", RUNS),
                 count.get("value") if hands else RUNS,
-                derived_runs="difference_of" in count,
             )
     if summaries and "" not in summaries:
         summaries[""] = pooled([*summaries.values()])

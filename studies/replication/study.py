@@ -28,7 +28,7 @@ from common.writing import fill_page, stored_picture
 
 HERE = Path(__file__).parent
 STYLE = HERE.parents[1] / "analysis" / "report" / "page.css"
-VERDICTS = "not supported", "depends on the goals", "undecided", "supported"
+VERDICTS = "not supported", "undecided", "supported"
 """Verdicts in the order of the page, failures first."""
 
 

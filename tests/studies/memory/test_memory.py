@@ -9,8 +9,8 @@ import pytest
 from coartic.analysis.statistics import bootstrap_test
 from tests.support.processes import ROOT, programs
 
-NAMES = "cells", "scales", "equal_gain", "study", "one_selection"
-CELLS, SCALES, EQUAL, STUDY, ONE = programs("memory", *NAMES)
+NAMES = "cells", "scales", "equal_gain", "study", "one_selection", "hands"
+CELLS, SCALES, EQUAL, STUDY, ONE, OF_HANDS = programs("memory", *NAMES)
 OF_OTHERS = importlib.import_module("scales")  # as the other programs import it
 STAGES = SCALES.STAGES
 
@@ -168,6 +168,7 @@ def test_tables_are_made_from_the_rows_that_ship(monkeypatch):
     monkeypatch.setattr(STUDY, "tabulate_equal", lambda _: equal)
     made = STUDY.tables_of(cells, pd.read_csv(folder / "runs.csv.xz", index_col=0))
     made["one_selection"] = ONE.tabulate(pd.read_csv(folder / "one_selection.csv.xz", index_col=0))
+    made["hands"] = OF_HANDS.tabulate(pd.read_csv(folder / "hands.csv.xz"))
     resampled = r"_(low|high)$|^level$|^where$|^p_|_p_|evidence"
     for name, ours in made.items():
         theirs = due.get(name, shipped(name)).dropna(axis=1, how="all")

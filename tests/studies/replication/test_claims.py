@@ -40,21 +40,6 @@ def judged(monkeypatch, planted):
     return claims.judge_claims(SimpleNamespace(suite="planted"), [*planted])
 
 
-@pytest.mark.parametrize(
-    ("finding", "verdict"),
-    [
-        (found(True, 0.001), "depends on the goals"),
-        (found(False, 0.999), "not supported"),
-    ],
-)
-def test_what_our_runs_show_may_depend_on_the_goals(monkeypatch, finding, verdict):
-    """Few sets of goals support half-choose-rlrr, and most of both tasks arm-coarticulation."""
-    planted = {"half-choose-rlrr": finding, "arm-coarticulation": finding}
-    of_few, of_most = judged(monkeypatch, planted).replicates
-    assert of_few == verdict
-    assert of_most != "depends on the goals"
-
-
 def test_groups_are_corrected_apart(monkeypatch):
     """A claim that is not judged counts in its group as one with p = 1."""
     by_group = claims.CLAIMS.groupby("group").groups
@@ -111,15 +96,14 @@ LOW, MIDDLE, HIGH, WORSE, BETTER = (
     [centre + off for off in (0, -2, 2, -1, 1, -3, 3, 0)]
     for centre in (-610, -505, -484, -352, -332)
 )
-MIXED = ["RLRR"] * 8 + ["RRRR"] * 8
 
 
-def on_1(condition, rewards, hands="LRLR"):
-    return learner(T1, condition, rewards, hands)
+def on_1(condition, rewards, hands="LRLR", **more):
+    return learner(T1, condition, rewards, hands, **more)
 
 
-def on_2(condition, rewards, hands, **more):
-    return learner(T2, condition, rewards, hands, -357, **more)
+def on_2(condition, rewards, hands):
+    return learner(T2, condition, rewards, hands, -357)
 
 
 BEST = (("ascending", "EC1"), ("descending", "EC1"), (T1, "EC4"), (T2, "EC4"))
@@ -156,14 +140,6 @@ def on_the_rail(free):
          + on_2("EC3", WORSE, "RRRR") + on_2("EC4", BETTER, "RLRR"), "supported"),
         ("multilevel-search", on_1("EC1", LOW) + on_1("EC3", MIDDLE)
          + on_2("EC1", BETTER, "RRRR") + on_2("EC3", WORSE, "RRRR"), "not supported"),
-        # About half. A tenth is too few, nine tenths are too many, and near them it is open.
-        ("ec2-sequences", on_1("EC2", MIDDLE * 5, ["RRLR", "LRLR"] * 20), "supported"),
-        *(("half-choose-rlrr", on_2("EC3", WORSE * 5, ["RLRR"] * n + ["RRRR"] * (40 - n)), verdict)
-          for n, verdict in ((4, "not supported"), (12, "undecided"), (28, "undecided"),
-                             (36, "not supported"))),
-        # Exact: one run.
-        ("ec4-mixed", on_2("EC4", WORSE + BETTER, MIXED), "supported"),
-        ("ec4-mixed", on_2("EC4", WORSE, "RLRR"), "not supported"),
         # The rail makes the sequence: with a free base it is not the commonest.
         ("rail", on_the_rail(["LRLR"] * 12 + ["RRRR"] * 12), "supported"),
         ("rail", on_the_rail(["LRLR"] * 24), "not supported"),
@@ -221,16 +197,16 @@ def seven(replays):
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        (on_2("EC3", WORSE, "RLRR", trials=3000), "Not judged: the paper's runs have 10000 trials"),
-        (on_2("EC3", WORSE[:4], "RLRR"), "fewer than 5 runs"),
+        (on_1("EC2", LOW, "RRLR", trials=3000), "Not judged: the paper's runs have 10000 trials"),
+        (on_1("EC2", LOW[:4], "RRLR"), "fewer than 5 runs"),
         (
-            on_2("EC3", WORSE, "RLRR")[:-1] + on_2("EC3", WORSE, "RLRR", status="crashed")[-1:],
-            "Not judged: 1 of 8 runs of dual-process/EC3 on Two-armed 2 failed",
+            on_1("EC2", LOW, "RRLR")[:-1] + on_1("EC2", LOW, "RRLR", status="crashed")[-1:],
+            "Not judged: 1 of 8 runs of dual-process/EC2 on Two-armed 1 failed",
         ),
     ],
 )
 def test_runs_that_are_not_like_the_papers_are_not_judged(rows, words):
-    judged = verdict_of("half-choose-rlrr", planted_study(rows))
+    judged = verdict_of("no-reversal", planted_study(rows))
     assert judged.verdict == "undecided"
     assert words in judged.evidence
 
