@@ -163,6 +163,13 @@ LOOKS_OF = {
 """First colour and all markers of the built-in methods by group. The groups begin at different
 colours, so that the shortest-path plan differs from the learners and searches that figures compare
 with it."""
+KINDS = {
+    BY_TRIAL: ("navy", "circle", "blue"),
+    BY_FORMULA: ("rust", "square", "orange"),
+    WITHOUT_REWARD: ("forest", "diamond", "green"),
+}
+"""Colour, marker and name of the colour of the built-in methods of a group, in figures that have a
+row for each method."""
 MARK = " ‡"
 """Mark after the title of a method for which there are warnings (:attr:`.Study.marks`)."""
 
