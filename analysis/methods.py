@@ -184,6 +184,13 @@ LOOKS_OF = {
 """Maps each group to the first colour and to all markers of its built-in methods. The groups that
 use the reward begin at different colours, so that the shortest-path plan looks different from the
 learners and searches with which figures compare it."""
+KINDS = {
+    BY_TRIAL: ("navy", "circle", "blue"),
+    BY_FORMULA: ("rust", "square", "orange"),
+    WITHOUT_REWARD: ("forest", "diamond", "green"),
+}
+"""Maps each group to the colour, the marker and the word for the colour of its built-in methods, in
+figures that have a row for each method."""
 MARK = " ‡"
 """Mark after the title of a method for which there are warnings (:attr:`.Study.marks`)."""
 

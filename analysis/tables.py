@@ -1033,8 +1033,8 @@ def _columns_of(signature: Signature) -> str:
     method           | method                     | | tex
     hands            | hands                      | | tex
     runs             | runs                       | | tex
-    control_runs     | runs of random search
-    control_idle_arm | idle arm in random search
+    control_runs
+    control_idle_arm
     """
     + "".join(map(_columns_of, SIGNATURES.values())),
 )
@@ -1354,8 +1354,8 @@ def list_family_gaps(study: Study) -> Rows:
     task       | task            |   | tex
     arms       | arms            |   | tex
     base       | base            |   | tex
-    initial    | initial         | 1 | tex
-    best_hands | best hands      | 1
+    initial    | initial         |   | tex
+    best_hands | best hands
     optimum    | best known      |   | tex
     source     | best known from
     bound      | proven bound    |   | tex

@@ -23,7 +23,9 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import FIGURES as FIGURES
 from coartic.analysis.figures.plot import (
     Parts,
+    describe_kinds,
     figure,
+    looks_by_kind,
     looks_in,
     name_in_figure,
     spoken,
@@ -209,7 +211,7 @@ def _draw_gaps(study: Study) -> Parts | None:
     if not len(rows):
         return None
     shown = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})
-    looks, by_group = looks_in(study, rows.method), shown.groupby("information")
+    looks, by_group = looks_by_kind(study, rows.method), shown.groupby("information")
     lines: list[Any] = []  # headings of groups, and rows
     for group in [group for group in GROUPS if group in by_group.groups]:
         lines += [capital(group), *by_group.get_group(group).to_dict("records")]
@@ -327,10 +329,10 @@ def draw_saved(study: Study) -> Parts | None:
     if not parts:
         return None
     shape, most_rows = style.grid(len(parts)), max(map(len, parts))
-    line, size = (0.17, 6) if style.is_narrow() else (0.42, 7)  # inches, points
+    line, size = (0.17, 6) if style.is_narrow() else (0.42, 8)  # inches, points
     height = shape[0] * (0.3 + line * most_rows)
     drawing, panels = style.panels(shape, (_width_of(shape), height), len(parts))
-    looks = looks_in(study, rows.method)
+    looks = looks_by_kind(study, rows.method)
     paper: Any = {"facecolor": style.BACKGROUND, "linewidth": 0, "pad": 0.6}
     for axes, part in zip(panels, parts, strict=True):
         task = study.tasks[part.task.iloc[0]]
@@ -346,8 +348,8 @@ def draw_saved(study: Study) -> Parts | None:
                 scale * np.array([row[f"{column}{end}"] for column in columns]) - place
                 for end in ("_low", "_high")
             )
-            # Not beyond the last bar, where a stump would look like a minus sign after the sum.
-            axes.hlines(-place, 0.6, at[-1] + 0.2, color=style.GREY, linewidth=0.5)
+            # Not beside the bars, where a stump would look like a minus sign after a number.
+            axes.hlines([-place] * len(at), at - 0.2, at + 0.2, color=style.GREY, linewidth=0.5)
             axes.bar(at, scale * ticks, 0.4, -place, color=color, alpha=0.55, linewidth=0)
             axes.vlines(at, low, high, color=style.INK, linewidth=0.9)
             for x, value in zip(at, ticks.round(), strict=True):
@@ -363,7 +365,7 @@ def draw_saved(study: Study) -> Parts | None:
     data = pd.concat(parts, ignore_index=True).drop(columns=["run_ids", "gap", "line"])
     words = spoken(study, data, "{task}, {title}: {by_goal_1:+.0f} and {sum:+.0f}")
     alt = f"Ticks more or fewer than by the corrective process, at goal 1 and in sum: {words}."
-    return drawing, data, alt, ""
+    return drawing, data, alt, describe_kinds(study, rows.method)
 
 
 @figure(
@@ -439,7 +441,7 @@ def draw_shared_goal(study: Study) -> Parts | None:
     place = place[[name.endswith(f" {shared.hand}") for name in place.index]]
     kept = without_settings(study.methods[study.methods.index.isin(place.method)]).index
     place = place[place.method.isin(kept)].sort_values("lean", ascending=False, kind="stable")
-    looks = looks_in(study, place.method)
+    looks = looks_by_kind(study, place.method)
     data = place.assign(
         name=[name_in_figure(study, label) for label in place.method],
         color=[looks[label]["color"] for label in place.method],
@@ -457,7 +459,9 @@ def draw_shared_goal(study: Study) -> Parts | None:
         f"{shared.goal}: {words}."
     )
     more = f" Goal {shared.goal} of {marked(first)} and {marked(second)}."
-    more += " Dashed: random search." * bool(lines)
+    more += " Dashed: random search." * bool(lines) + describe_kinds(
+        study, place.method, with_marks=True
+    )
     if place.lean.isna().any():
         more += " No dot: the runs are too few, or the next postures nearly the same."
     names = ["method", "runs", *(f"{name}{end}" for name in DOTS for end in ("", "_low", "_high"))]
@@ -599,17 +603,20 @@ def draw_runtimes(study: Study) -> Parts | None:
     style.letters(panels)
     ends = data.groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share).sort_values("share")
-    gap, heights = 9 if style.is_narrow() else 6.5, list[float]()
-    for share in ends.share:
+    # Long names have several lines: on a phone, this panel is as wide as the page.
+    names = [name_in_figure(study, label, 18) for label in ends.method]
+    half = np.array([name.count("\n") + 1 for name in names]) * (4.5 if style.is_narrow() else 3.3)
+    apart, heights = [*(half[:-1] + half[1:]), 0.0], list[float]()
+    for share, gap in zip(ends.share, [0.0, *apart], strict=False):
         heights.append(max(share, heights[-1] + gap if heights else -math.inf))
-    over = np.arange(len(heights))[::-1] * gap  # the names below one whose place is the top
+    over = np.cumsum(apart[::-1])[::-1]  # the names below one whose place is the top
     heights = np.minimum(heights, 100 - over).tolist()
-    for end, height in zip(ends.to_dict("records"), heights, strict=True):
+    for end, name, height in zip(ends.to_dict("records"), names, heights, strict=True):
         at, look = panels[-1].get_yaxis_transform(), looks[end["method"]]
         mark: Any = {"color": look["color"], "markersize": 4, "markeredgewidth": 0}
         panels[-1].plot(1.03, height, look["marker"], transform=at, clip_on=False, **mark)
         panels[-1].annotate(
-            name_in_figure(study, end["method"]), (1.03, height), (5, 0), va="center",
+            name, (1.03, height), (5, 0), va="center",
             xycoords=at, textcoords="offset points", annotation_clip=False,
             weight="normal" if study.methods.built_in[end["method"]] else "bold",
         )  # fmt: skip
@@ -802,7 +809,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         parts.append(dots)
     data = pd.concat(parts, ignore_index=True).astype({"gap": float})
     order = data.groupby("method").gap.mean().sort_values().index.tolist()
-    looks = looks_in(study, order)
+    looks = looks_by_kind(study, order)
     families = list(dict.fromkeys(data.family))
     size = style.TWO, 0.9 + 0.19 * len(order)
     drawing, panels = style.panels((1, len(families)), size, sharey=True)
@@ -833,10 +840,11 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
     means = spoken(study, rows_with_mean, "{title}, {family}: {mean:.1%}")
     words = f" {means}." if means else ""
     alt = f"Gaps of instances by method and family.{words}"
-    return drawing, data, alt, " Gaps above 100 % stand at the right end." * any(data.gap > 1)
+    more = " Gaps above 100 % stand at the right end." * any(data.gap > 1)
+    return drawing, data, alt, more + describe_kinds(study, order)
 
 
-_DISC = 9.5  # diameter of the disc of a goal, in points
+_DISC = 10.5  # diameter of the disc of a goal, in points
 _DISC_LOOK: Any = {
     "markersize": _DISC, "markerfacecolor": style.BACKGROUND, "markeredgecolor": style.BLUE,
     "markeredgewidth": 1.0,
@@ -939,5 +947,5 @@ def _draw_order(axes: Axes, goals: Array, apart: float) -> None:
         axes.annotate("", end, start, arrowprops={"arrowstyle": "->", "linewidth": 0.8, **ends})
     axes.plot(*places.T, "o", clip_on=False, zorder=4, **_DISC_LOOK)
     for goal, (x, y) in enumerate(places, 1):
-        text: Any = {"ha": "center", "va": "center_baseline", "fontsize": 7, "zorder": 5}
+        text: Any = {"ha": "center", "va": "center_baseline", "fontsize": 8, "zorder": 5}
         axes.text(x, y, str(goal), **text)

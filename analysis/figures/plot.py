@@ -22,10 +22,17 @@ from matplotlib.figure import Figure
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
-from coartic.analysis.methods import COLORS, MARK, MARKS, default_name, describe_values
+from coartic.analysis.methods import (
+    COLORS,
+    KINDS,
+    MARK,
+    MARKS,
+    default_name,
+    describe_values,
+)
 from coartic.analysis.standings import reference
 from coartic.analysis.study import Study, check_study
-from coartic.analysis.words import RECONSTRUCTED, ending_of, id_of, number
+from coartic.analysis.words import RECONSTRUCTED, capital, ending_of, id_of, number
 from coartic.errors import CoarticError
 from coartic.internal.files import describe_os_errors
 from coartic.internal.limits import brief_value
@@ -159,6 +166,35 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
             "markevery": 0.2,  # a marker at each fifth of the diagonal
         }  # fmt: skip
     return looks
+
+
+def looks_by_kind(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
+    """Return the looks of methods in figures with a row for each method, by label.
+
+    Colour and marker say which use of the reward a method makes (:data:`.KINDS`). Methods from a
+    user's method file keep the looks of :func:`looks_in`.
+    """
+    looks = looks_in(study, labels)
+    for label, look in looks.items():
+        row = study.methods.loc[label]
+        if row.built_in:
+            color, mark, _ = KINDS[str(row.information)]
+            look |= {"color": COLORS[color], "marker": MARKS[mark][0]}
+    return looks
+
+
+def describe_kinds(study: Study, labels: Iterable[str], *, with_marks: bool = False) -> str:
+    """Return a sentence for a caption that says what the colours of :func:`looks_by_kind` mean.
+
+    If ``with_marks`` is True, the sentence also names the markers.
+    """
+    rows = study.methods.loc[[*labels]]
+    kinds = {*rows.information[rows.built_in.astype(bool)]}
+    words = [
+        f"{word}{f' {mark}s' * with_marks}: methods {kind}"
+        for kind, (_, mark, word) in KINDS.items() if kind in kinds
+    ]  # fmt: skip
+    return f" {capital('; '.join(words))}." if len(words) > 1 else ""
 
 
 def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -> str:
