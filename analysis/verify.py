@@ -13,14 +13,13 @@ The rules (Shah, Barto & Fagg 2013, *A Dual Process Account of Coarticulation in
 Acquisition*):
 
 - A robot, a mobile base with two arms, hits goals with its hands, in order. Each goal has one hand.
-- A configuration q has x and y of the base (length units), then the joint angles of the left arm
-  and of the right arm (rad).
-- A movement goes straight from q to a target q^t in steps of length m in joint space. The last
-  step, which can be shorter, ends at q^t.
+- A configuration q has x and y of the base, then the angles of the left arm and of the right arm.
+- A movement goes straight from q to a target q^t in steps of length m. Its last step, which can be
+  shorter, ends at q^t.
 - Before each step the robot checks whether to stop. It stops if its hand is within the radius of
   the goal (a hit). In a learned or planned movement, it also stops if its hand is within θ^a of the
   position that it would have at q^t (arrival).
-- A step costs one tick, and stopping costs one more tick. The reward is minus the sum of all ticks.
+- A step costs one tick, and stopping costs one more. The reward is minus the sum of all ticks.
 - The first movement for a goal is always made, unless it is corrective. Any other movement is only
   made if the goal is not hit yet.
 - A movement of kind *path* leads through waypoints. It stops on a hit, or at its end.
@@ -89,11 +88,10 @@ def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
 
 
 def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
-    """Return x and y of a hand (length units) for n configurations.
+    """Return x and y of a hand (length units) for n configurations, shape ``(n,)`` each.
 
-    Both have shape ``(n,)``. ``q``, shape ``(dof, n)``, has a configuration in each column. ``arm``
-    is a tuple of the slice of the arm's joints, the lengths of its links, and the position of its
-    shoulder on the base.
+    ``q``, shape ``(dof, n)``, has a configuration in each column. ``arm`` has the slice of the
+    arm's joints, the lengths of its links, and the position of its shoulder on the base.
     """
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
@@ -107,14 +105,8 @@ def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
 def stored_task(content: str) -> Any:
     """Return the task of a cell, read from the cell's stored JSON.
 
-    The task has the keys of a task file as attributes, and further attributes:
-
-    - ``model``: constants of the motion model;
-    - ``q0``: configuration at the start;
-    - ``locked``: indices of the locked coordinates of the base;
-    - ``arms``: maps each hand to its arm (:func:`hand_at`);
-    - ``digest``: hash of the cell;
-    - ``labels``: names of task, method, setting and world.
+    It has attributes that a task file lacks: constants of the motion model (``model``), the start
+    (``q0``), ``locked`` coordinates, ``arms``, and ``digest`` (hash) and ``labels`` of the cell.
     """
     plain = json.loads(content)
     cell = json.loads(content, object_hook=lambda values: SimpleNamespace(**values))
@@ -138,10 +130,7 @@ def stored_task(content: str) -> Any:
 
 
 def scaled(changes: Floats, model: Any) -> Floats:
-    """Return the sizes of changes of coordinates, whose norm is the length of a movement.
-
-    ``changes`` has shape ``(..., dof)``. Changes of the base are multiplied by their weight.
-    """
+    """Return the weighted sizes of changes, whose norm is a movement's length: ``(..., dof)``."""
     sizes = np.abs(changes)
     sizes[..., :2] *= model.base_weight
     return sizes
@@ -150,8 +139,8 @@ def scaled(changes: Floats, model: Any) -> Floats:
 def straight_path_points(q: Floats, target: Floats, model: Any) -> Floats:
     """Return the points of a straight movement from ``q`` to a target, shape ``(dof, points)``.
 
-    The points are spaced by ``model.step`` in joint space; the last step can be shorter. A
-    coordinate whose entry in the target is NaN does not move.
+    They are spaced by ``model.step`` in joint space; the last step can be shorter. A coordinate
+    whose entry in the target is NaN does not move.
     """
     target = np.where(np.isnan(target), q, target)
     difference = target - q
@@ -184,10 +173,10 @@ def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
 def make(
     task: Any, q: Floats, goal: int, hand: str, kind: str, corners: Floats
 ) -> tuple[Floats, int, bool]:
-    """Make a movement, and return its end, its ticks, and whether it hits.
+    """Make a movement from ``q``, and return its end, its ticks, and whether it hits.
 
-    The movement starts at ``q``. ``corners``, shape ``(rows, dof)``, has the target as its only
-    row, or a row for each waypoint of a path. ``goal`` is the number of the goal, from 1.
+    ``corners``, shape ``(rows, dof)``, has the target as its only row, or a row for each waypoint
+    of a path. ``goal`` is the number of the goal, from 1.
     """
     model, is_path = task.model, kind == "path"
     points = path(q, corners, model) if is_path else straight_path_points(q, corners[-1], model)
@@ -204,14 +193,13 @@ def make(
 
 
 def _recompute(task: Any, movements: list[list[Any]]) -> tuple[Any, ...]:
-    """Make all movements of a part of a run again, and return its results.
+    """Make all movements of a part of a run again.
 
-    Each movement is a list of its goal (from 1), hand, kind, ticks, and path as JSON.
+    Each movement is a list of its goal (from 1), hand, kind, ticks, and path as JSON. Raises
+    ValueError if a rule is broken, or if ticks differ from the stored ticks.
 
-    The result is a tuple of the reward, the letters of the hands, the number of corrective
-    movements, and the distance in joint space (rad) that the idle arm travels, summed over goals.
-    With motor noise, it is a tuple of only None and the letters. Raises ValueError if a rule is
-    broken, or if ticks differ from the stored ticks.
+    Returns reward, letters of the hands, number of corrective movements, and joint-space distance
+    (rad) that idle arms travel, summed over goals. With noise, only None and the letters.
     """
     goals = [movement[0] for movement in movements]
     order = [*range(1, len(task.goals) + 1)]
@@ -262,9 +250,8 @@ class Report(NamedTuple):
 def check_runs(folder: Path) -> Report:
     """Execute the stored movements of a results folder, and report what differs or is missing.
 
-    Runs that the last plan does not ask for are checked, too. No method is run. Raises ValueError
-    if the file has an unknown format or is damaged, and another error, such as sqlite3.Error, if it
-    cannot be read.
+    Runs that the last plan does not ask for are checked, too. No method is run. Raises an error,
+    such as ValueError or sqlite3.Error, if the folder cannot be read or is damaged.
     """
     # Mode rw, because SQLite must undo an unfinished batch.
     where = f"{(folder / 'runs.sqlite').absolute().as_uri()}?mode=rw"
@@ -291,10 +278,9 @@ def check_runs(folder: Path) -> Report:
 
 
 def _check_run(row: Any) -> int:
-    """Execute the stored movements of a run, and return the number of movements.
+    """Execute the stored movements of a run, and return their number.
 
-    Raises ValueError if the execution differs from the stored results, or if the run is not the one
-    to which its id, seed and labels belong.
+    Raises ValueError if the results differ, or if id, seed or labels belong to another run.
     """
     need(row["content"], "its cell is missing")
     task = stored_task(row["content"])
@@ -323,10 +309,7 @@ def _check_run(row: Any) -> int:
 
 
 def main() -> int:
-    """Check the results folder that the command line names, and print the result.
-
-    Returns 1 if a run differs or is missing, otherwise 0.
-    """
+    """Check the folder that the command line names; return 1 if a run differs or is missing."""
     report = check_runs(Path(sys.argv[1]))
     print(f"{report.runs} runs checked, {report.movements} movements executed.")
     print(*(report.wrong or ["Nothing differs."]), *report.unfinished, sep="\n")

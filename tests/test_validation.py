@@ -211,7 +211,7 @@ def test_a_name_and_a_path_stand_for_the_task(call):
     ("call", "words"),
     [
         (lambda: correct(ROBOT, TASK.q0, "right", (True, 1.0)), "goal is "),
-        (lambda: correct(ROBOT, TASK.q0, "rigt", (3.0, 1.0)), "hand 'rigt'"),
+        (lambda: correct(ROBOT, TASK.q0, "rigt", (3.0, 1.0)), "hand is 'rigt'; it must be"),
         (lambda: Movement(1, "right", "planned", MASKED), "target is "),
         (lambda: make_trials(TASK, "RRR", [[MASKED] * 3]), "masked"),
         (lambda: interval({"a": "x", "a_low": 0, "a_high": 1}, "a"), "a_l"),
