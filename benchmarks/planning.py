@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, PlainValidator, ValidationError
+from pydantic import AfterValidator, Field, PlainValidator, ValidationError
 
 from coartic import CoarticError, Task, builtin_tasks, load_task
 from coartic.benchmarks.registry import Registry, methods_named, registry
@@ -71,6 +71,16 @@ def _runs_asked(value: Any) -> int | range | None:
     return value if is_range or value is None else int(value)
 
 
+def _one_world(worlds: Worlds) -> Worlds:
+    """Refuse several worlds."""
+    if len(worlds) > 1:
+        raise described_error(
+            "model has a list of values; here each constant has one value. Lists belong into table "
+            "'model' of a suite or of its blocks"
+        )
+    return worlds
+
+
 class Request(FileData):
     """What a command asks for: tasks, methods and runs of a suite, and limits."""
 
@@ -102,7 +112,7 @@ class Request(FileData):
     """Limit of the CPU time of a job (in s); by default the limit that the suite sets."""
     trial_budget: TrialCount | None = None
     """Largest number of physical trials of a run, for all methods; by default there is no limit."""
-    model: Worlds | None = None
+    model: Annotated[Worlds, AfterValidator(_one_world)] | None = None
     """World in which methods practise and are scored, as a dict with one value for each constant
     that differs from the paper's, such as ``{"motor_noise": 0.01}``. Blocks of the suite that have
     a world of their own (table ``model`` of the block or of the suite) are left out, with a

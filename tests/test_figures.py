@@ -152,7 +152,7 @@ def test_a_figure_has_chosen_style(tmp_path):
     assert plot.figure.axes[0].xaxis.label.get_fontsize() == 20.0
     plot.save(tmp_path / "mine.svg")
     assert "<svg" in (tmp_path / "mine.svg").read_text("utf-8")
-    with pytest.raises(CoarticError, match=r"\.svg, \.pdf, \.png, not in '\.doc'"):
+    with pytest.raises(CoarticError, match=r"'\.doc'; it must be one of \.svg, \.pdf, \.png"):
         plot.save(tmp_path / "mine.doc")
 
 

@@ -141,7 +141,7 @@ def test_running_times_that_cannot_be_shown(study):
     for targets in ([], [0.0], [1.01]):
         with pytest.raises(CoarticError, match="must be numbers above 0 and up to 1"):
             runtimes(study, targets=targets)
-    with pytest.raises(CoarticError, match="no task has a best known reward"):
+    with pytest.raises(CoarticError, match="has no task whose best known reward is above"):
         runtimes(MadeUp(study, optima={}))
 
 

@@ -80,6 +80,14 @@ def test_a_command_sets_the_world_of_blocks_without_one(suite):
     assert {job.cell.task.name for job in plan} == {"ascending"}
 
 
+def test_a_request_has_one_world():
+    with pytest.raises(
+        CoarticError, match="model has a list of values; here each constant has one"
+    ):
+        plan_suite("quick", model={"motor_noise": [0.01, 0.02]})
+    assert plan_suite("quick", model={"motor_noise": [0.01]})
+
+
 def test_methods_beside_the_blocks_run_in_the_worlds_of_the_suite(suite):
     """In the paper's world if a block has it, or else in all that the blocks have."""
     noisy = BLOCK + "model = { motor_noise = [0.01, 0.02] }\n"
