@@ -12,8 +12,8 @@ class Mine(Optimiser):
 
     The length of the steps follows the one-fifth rule. The length grows after a batch with a point
     at least as good as the best point before, and shrinks after any other batch; if one batch in
-    five has such a point, the length stays about the same. On the paper's tasks the gap is 6.3
-    [6.1, 6.5] %, and the gap of the paper's learner is 7.9 %. With motor noise the best cost was
+    five has such a point, the length stays about the same. On the paper's tasks the gap is 6.2
+    [6.0, 6.5] %, and the gap of the paper's learner is 7.9 %. With motor noise the best cost was
     partly lucky, so that the steps become too short: improve this first.
     """
 
