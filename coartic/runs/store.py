@@ -390,12 +390,16 @@ class Store:
             job = Job(cell, row["suite_seed"], (row["run"],), row["time_limit_s"])
             if job.run_id(row["run"]) != run_id:
                 raise ValueError(f"run {run_id} does not match its id")
-            rewards = _unpack(row["rewards"]).tolist()
+            unpacked = _unpack(row["rewards"])
+            failed = np.isnan(unpacked)
+            rewards: list[int | None] = np.where(failed, 0, unpacked).astype(np.int64).tolist()
+            for trial in np.flatnonzero(failed):
+                rewards[trial] = None
             return Row(
                 job,
                 missing | values,
                 json.loads(row["movements"]),
-                [None if np.isnan(reward) else int(reward) for reward in rewards],
+                rewards,
                 dict(json.loads(row["details"])),
                 dict(json.loads(row["made"])),
             )
