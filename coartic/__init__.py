@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from coartic.tasks.catalogue import builtin_tasks, load_task
     from coartic.tasks.task import Provenance, Start, Task, parse_task
 
-__version__ = "6.0.0"
+__version__ = "7.0.0"
 
 __all__ = [
     "ABLATIONS",
