@@ -625,7 +625,7 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
     method             | method                            |   | tex
     gap[]              | gap (%)                           | 1 | tex
     share[]            | share of the gain (%)             | 0 | tex
-    noisy_gap[]        | gap with motor noise 0.01 (%)     | 1 | tex
+    noisy_gap[]        | gap executed with motor noise 0.01 (%) | 1 | tex
     information        | use of the reward
     better             | better than the learner on (tasks)
     worse              | worse on (tasks)
