@@ -147,6 +147,7 @@ def _settings_behind(study: Study, rows: pd.DataFrame) -> str:
     trials = f" in {number(budget)} trials" if budget else ""
     open_ones = int((behind.share_high >= 0).sum())
     chance = f", {open_ones} of them within chance" if open_ones else ""
+    chance = ", within chance" if open_ones == count else chance
     return f"{who} behind the corrective process with {hands}{trials}{chance}."
 
 
