@@ -53,8 +53,9 @@ from settings import (
 )
 
 from coartic.analysis import TwoContexts, figures, load, mean, means
-from coartic.analysis.statistics import holm
+from coartic.analysis.statistics import bootstrap_test, holm
 from coartic.estimates import LEVEL, Estimate, difference_of_means
+from common import judging
 from common.judging import level_of, mean_beyond
 from common.writing import write_study
 
@@ -204,12 +205,29 @@ def values_of_pairs(leans, claim):
     )  # fmt: skip
 
 
+def two_tailed(cells):
+    """Return for each cell the larger p of two-tailed tests with all tasks and without one.
+
+    The values of a cell are tested with all tasks, and without the task that favours the sign of
+    their mean most. Both p are corrected over all cells (Holm).
+    """
+    signed = [each * np.sign(each.mean()) for each in cells]
+    others = [np.delete(each, each.argmax()) for each in signed]
+    p, p_without = (
+        holm([bootstrap_test(each, 0.0, "two-sided", resamples=judging.RESAMPLES_OF_CLAIMS).p
+              for each in samples])
+        for samples in (signed, others)
+    )  # fmt: skip
+    return np.fmax(p, p_without)
+
+
 def verdicts(cells):
     """Judge the cells of a claim: a mapping of a cell to its values, one for each task.
 
     Returns a table with a row for each cell: ``p`` and ``opposite_p`` after correction, each with
     ``_without`` the task that favours this side most, ``skewness``, the verdict with all tasks
-    (``all_tasks``), that ``without`` this task, and the ``verdict`` that needs both.
+    (``all_tasks``), that ``without`` this task, the ``verdict`` that needs both, and the one that
+    two-tailed tests would give (``verdict_two_tailed``; a description, not registered).
     """
     count, columns = len(cells), {}
     for side, name in (("greater", "p"), ("less", "opposite_p")):
@@ -229,8 +247,11 @@ def verdicts(cells):
         np.where(means > 0, table["p" + suffix], table["opposite_p" + suffix])
         for suffix in ("", "_without")
     )
-    is_sure = np.fmax(p, p_without) < [level_of(each) for each in values]
+    levels = [level_of(each) for each in values]
+    is_sure = np.fmax(p, p_without) < levels
     table["verdict"] = table.all_tasks.where((table.all_tasks == table.without) & is_sure, "open")
+    is_sure = two_tailed(values) < levels
+    table["verdict_two_tailed"] = np.where(is_sure, np.where(means > 0, "holds", "reversed"), "open")
     return table
 
 
