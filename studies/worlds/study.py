@@ -251,7 +251,9 @@ def verdicts(cells):
     is_sure = np.fmax(p, p_without) < levels
     table["verdict"] = table.all_tasks.where((table.all_tasks == table.without) & is_sure, "open")
     is_sure = two_tailed(values) < levels
-    table["verdict_two_tailed"] = np.where(is_sure, np.where(means > 0, "holds", "reversed"), "open")
+    table["verdict_two_tailed"] = np.where(
+        is_sure, np.where(means > 0, "holds", "reversed"), "open"
+    )
     return table
 
 
