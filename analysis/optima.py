@@ -115,6 +115,7 @@ def best_known(
     solved = runs.assign(value=values)[
         (runs.status == "ok") & values.notna() & (restrictions(runs).base == BASE)
     ]
+    solved = solved[["task", "method", "setting", "run_id", "hands", "value"]]
     is_search = solved.method.isin(SEARCHES)
     solved = pd.concat([solved[is_search], solved[~is_search]])  # in a tie, a search comes first
     by_task, rewards, models = dict([*solved.groupby("task")]), {}, models or {}

@@ -409,9 +409,9 @@ class Study:
         process does not complete the task.
         """
         by_task = {}
-        for name, of_task in self.stored.groupby("task", sort=False):
+        for name, runs in self.stored.groupby("task", sort=False).run:
             task, model = self.tasks[str(name)], self.models[str(name)]
-            numbers = sorted(map(int, of_task.run.unique()))
+            numbers = sorted(map(int, runs.unique()))
             seeds = [judge_seed(self.plan[0].seed, task.name, number) for number in numbers]
             if (best := best_hands(task, model)) is None:
                 by_task[task.name] = dict.fromkeys(numbers, math.nan)

@@ -1297,7 +1297,7 @@ def gaps_by_family(study: Study, runs: pd.DataFrame) -> Scores:
     """
     return {
         str(family): [
-            part.gap.to_numpy(np.float64) for _, part in of_family.groupby("task", sort=False)
+            gaps.to_numpy(np.float64) for _, gaps in of_family.groupby("task", sort=False).gap
         ]
         for family, of_family in runs.groupby("family", sort=False)
         if of_family.task.nunique() == len(_instances(study)[str(family)])
