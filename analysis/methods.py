@@ -434,10 +434,11 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return rows of methods without settings and ablations of other methods in these rows.
+    """Leave out the rows that are settings or ablations of another method in ``rows``.
 
     ``rows`` are rows of :attr:`.Study.methods`. Column ``parent`` names the method of which a row
-    is a setting or an ablation. The settings of a study that varies parameters are kept.
+    is a setting or an ablation. In a study that varies parameters, the settings have no parent, and
+    are kept.
     """
     return rows[~rows.parent.isin(rows.index)]
 

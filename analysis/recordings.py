@@ -257,7 +257,7 @@ def _table(path: str | Path) -> pd.DataFrame:
 
 
 def _require(frame: pd.DataFrame, columns: list[str], source: str) -> None:
-    """Raise CoarticError if a column is missing or duplicate, or rows are missing.
+    """Raise CoarticError if a frame lacks a column, has a column twice, or has no rows.
 
     ``source`` is the name of the frame in the message.
     """

@@ -173,7 +173,8 @@ def isolated_reaches(
     Raises
     ------
     ValueError
-        A goal's number is out of range, or shapes do not fit.
+        A number of a goal is out of range, a hand is neither 0 nor 1, shapes do not fit, or the
+        model has motor noise.
     """
     q, numbers = np.asarray(q), 1 + np.arange(len(task.goals))
     shape = q.shape[:-1]

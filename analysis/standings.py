@@ -77,10 +77,12 @@ def runs_by_method(study: Study) -> dict[str, pd.DataFrame]:
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Return the runs of a method on tasks, including failed runs.
+    """Select the runs of a method on given tasks from the runs that the ranking uses.
 
-    ``method`` is the label of the method, or the label of a row of the ranking. The frame is empty
-    if at least one of the tasks has no run of the method.
+    The runs are selected from :func:`compared_runs`, whose errors are raised; failed runs are
+    included. ``method`` is the label of the method, or the label of a row of the ranking. The frame
+    is empty if at least one of the tasks has no such run. It is therefore empty for a search for
+    the optimum, and if one of the tasks has no best known reward.
     """
     runs, tasks = compared_runs(study), {*tasks}
     runs = runs[runs.task.isin(tasks) & ((runs.ranked_as == method) | (runs.label == method))]

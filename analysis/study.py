@@ -346,8 +346,9 @@ class Study:
     def _reference_values(self, task: str, answers: Sequence[Sequence[Movement]]) -> list[float]:
         """Return minus the mean ticks of 1,000 executions of each answer.
 
-        An answer is a sequence of movements. The noise is that of references (:func:`.judge`,
-        :func:`.reference_seed`).
+        An answer is a sequence of movements. The executions use the noise seed of references
+        (:func:`.reference_seed`), which differs from the seeds by which runs are judged
+        (:func:`.judge`).
         """
         seeds = [reference_seed(self.plan[0].seed, task)] * len(answers)
         means, _ = judge(self.tasks[task], answers, self.models[task], seeds, FRESH_EXECUTIONS)

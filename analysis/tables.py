@@ -443,8 +443,10 @@ def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
 def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[str] = ()) -> str:
     """Return a table as LaTeX with booktabs and longtable, made by pandas' Styler.
 
-    The table has the columns that are marked with ``tex``. The sentences in ``notes`` follow below
-    the table. If the table or a note has a dagger, a sentence that explains it is added.
+    The table contains the columns whose attribute ``in_latex`` is True (marked with ``tex`` in the
+    definition of the table), except columns without a value. The sentences in ``notes`` follow
+    below the table. If a dagger occurs in the table or in a note, a sentence that explains the
+    dagger is added.
     """
     columns = shown_columns(table, study, frame, in_latex=True)
     cells = pd.DataFrame({name: map(latex, column.texts) for name, column in columns.items()})
@@ -919,10 +921,11 @@ def list_parameters(study: Study) -> Rows:
 
 
 def _are_equal(study: Study, settings: Sequence[Sequence[str]]) -> bool:
-    """Return True if each run has the same value at all values of a parameter.
+    """Return True if a parameter has no effect: all its values give the same results.
 
-    ``settings`` has a list of labels for each value of the parameter. Settings at the same position
-    in two lists differ only in this parameter; their runs are compared.
+    ``settings`` contains a list of labels of settings for each value of the parameter. Settings at
+    the same position of two lists differ only in this parameter. Runs of such settings with the
+    same task and number are compared by their scores (column ``value`` of :attr:`.Study.runs`).
     """
     by_run = compared_runs(study).set_index(["task", "run"])
     for labels in zip(*settings, strict=True):
@@ -1039,19 +1042,19 @@ def _columns_of(signature: Signature) -> str:
     + "".join(map(_columns_of, SIGNATURES.values())),
 )
 def list_signatures(study: Study) -> Rows:
-    """Yield the signatures of each method, except searches, on each individual task.
+    """Yield the mean signatures of each method on each individual task.
 
-    A method has on each task
+    Searches for the optimum are left out. For each other method on each task, there are
 
-    - a row for each hand sequence that at least a tenth of its solved runs have
+    - a row for each hand sequence that occurs in at least a tenth of the method's solved runs
       (:func:`.with_control`);
-    - a row for the choice of hands itself, whose ``hands`` are empty, if the task is for two arms
-      and has at least two goals.
+    - a row for the choice of hands itself, with an empty entry in column ``hands``, if the task is
+      for two arms and has at least two goals.
 
-    Signatures are means over runs. For a method that selects its solution from trials, a row also
-    has the signatures of random search, and the p-value of the one-sided exchange test, which is
-    not adjusted for multiple tests. Column ``control_idle_arm`` says how random search treats the
-    idle arm: ``with noise``, or ``still`` as under EC3.
+    Signatures are means over runs. If a method selects its solution from trials
+    (:func:`.selects`), its rows also contain the signatures of random search and the p-value of the
+    one-sided exchange test, which is not adjusted for multiple tests. Column ``control_idle_arm``
+    says how random search treats the idle arm: ``with noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     # The row of the choice of hands is above those of hand sequences.

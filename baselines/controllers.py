@@ -125,10 +125,10 @@ class Controller(ABC):
         Returns
         -------
         Solution
-            Solution of the cascade. The unit of its changes is ``length``, the largest joint-space
-            length of a control step.
+            Solution of the cascade. Its changes are multiples of ``self.length``, the largest
+            joint-space length of a control step.
         ndarray, shape (joints,)
-            Preferred changes of the joints, in the same unit.
+            Preferred changes of the joints, as multiples of ``self.length``.
         object
             Memory after the step.
         """

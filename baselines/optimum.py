@@ -182,7 +182,7 @@ def with_locks(task: Task, base: str) -> Task:
 
 
 class InModelParameters(Parameters):
-    """Parameters of the search for the optimum in any motion model: its effort."""
+    """Parameters that set the effort of the search for the optimum in any motion model."""
 
     evaluations: Annotated[int, Field(ge=0)] = 4000
     """Number of solutions that CMA-ES tries from each start. The last generation is completed, so

@@ -228,11 +228,11 @@ class PosturePlanner:
 
         For each goal and hand, each stored posture is corrected in three steps:
 
-        1. The angles of the hand's arm are copied from the stored posture, all other entries from
-           ``q``.
+        1. The angles of the hand's arm are copied from the stored posture, and all other entries
+           from ``self.q``, the configuration in which the movements planned so far end.
         2. The free base coordinates move by the displacement from the hand to the goal.
-        3. Base and arm are corrected (:meth:`correct`). Postures whose hand is still not at the
-           goal are left out.
+        3. Base and arm are corrected (:meth:`correct`). A posture is left out if its hand is still
+           not at the goal.
 
         Parameters
         ----------

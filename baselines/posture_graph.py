@@ -211,10 +211,10 @@ def chains_of(
 def _extend(
     task: Task, layers: Layers, begun: PrefixCosts, base_weight: float
 ) -> Iterator[PrefixCosts]:
-    """Extend a prefix by one goal, with each hand that has nodes there.
+    """Extend a prefix of a hand sequence by one goal, with each hand that has nodes at the goal.
 
-    ``begun`` is the table of the prefix. ``layers`` and ``base_weight`` are as in
-    :func:`chains_of`.
+    ``begun`` contains the costs of the prefix. Yields the costs of each longer prefix, first that
+    with the left hand. ``layers`` and ``base_weight`` are as in :func:`chains_of`.
     """
     hands, nodes, cost, predecessors = begun
     goal = len(hands)

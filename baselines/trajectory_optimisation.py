@@ -352,9 +352,10 @@ def path_movements(
     """Divide a path into movements of kind ``path``, one for each goal.
 
     A movement ends where the hand enters its goal, usually before the end of the piece of the path
-    that leads to this goal. The next movement therefore begins with the rest of that piece. Joints
-    that ``instance`` holds on the way to the next goal do not move in the rest. A movement that
-    misses its goal is returned like the others.
+    that leads to this goal. The next movement therefore begins with the remaining waypoints of that
+    piece. At these waypoints, the joints that ``instance`` holds during the next movement keep the
+    angles that they have at the start of this movement. A movement that misses its goal is
+    returned, too.
 
     Parameters
     ----------

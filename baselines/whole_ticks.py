@@ -192,12 +192,12 @@ class Rounding:
         *,
         deep: Sequence[int] = (),
     ) -> PathPlan:
-        """Solve for a locally shortest plan from a start.
+        """Solve for a locally shortest plan, beginning from an initial guess.
 
         Parameters
         ----------
         start : ndarray, shape (G, dof)
-            Configuration at each goal from which the solver starts.
+            Initial guess of the solver: a configuration at each goal.
         lengths : ndarray, shape (G,)
             Largest joint-space length of each movement; NaN for a movement of any length.
         merged : tuple of int

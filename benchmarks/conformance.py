@@ -278,7 +278,7 @@ second function returns a sentence on what was checked; it is called if there is
 
 
 def _hopeless_task(like: Task) -> Task:
-    """Return a copy of a task with one goal, which is out of reach."""
+    """Return a copy of a task in which one goal, out of reach, replaces all goals."""
     return like.model_copy(
         update={
             "name": "hopeless",

@@ -261,7 +261,7 @@ def _user_files(names: Iterable[str]) -> set[Path]:
 
 
 def _packages_of(files: Iterable[Path]) -> dict[str, str]:
-    """Return a dict that maps each installed package that Python files import to its version.
+    """Return the installed packages that Python files import, as a dict from names to versions.
 
     Modules of the standard library and of coartic are left out.
     """

@@ -368,15 +368,15 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 
 
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Divide jobs into smaller jobs for workers, in the order of their start.
+    """Divide jobs into smaller jobs, and return these in the order in which workers start them.
 
-    - *Size.* A method that makes many runs side by side takes less time than for the same runs one
-      by one. So a job has as many runs as the method allows (:meth:`.Method.max_batch`), but it
-      should take only some seconds, and each of the ``workers`` processes should get some of the
-      runs.
+    - *Size.* Many methods need less time for many runs side by side than for the same runs one by
+      one. So a job has as many runs as the method allows: :meth:`.Method.max_batch` for a built-in
+      method, and one run for a method from a file. A job is smaller if it would take more than
+      some seconds, or if some of the ``workers`` processes would get no runs.
     - *Order.* Jobs with more trials start earlier, so that no long job is left alone at the end.
-      Jobs of methods without a number of trials, such as planners, start first, because one of
-      their runs can take as long as thousands of trials.
+      Jobs of methods without a number of trials, such as planners, start first, because one run of
+      such a method can take as long as thousands of trials.
     """
 
     def divide(job: Job, size: int) -> Iterator[Job]:

@@ -313,12 +313,11 @@ def tasks_of(block: _Block, own: Collection[str], task_named: TaskNamed) -> Iter
 def _changed_tasks(task: Task, block: _Block) -> list[Task]:
     """Return the tasks that a block of a suite makes of a task.
 
-    - With ``free_base`` the base is freed.
-    - With ``move`` there is a task for each displacement of the goal.
-    - Otherwise the list has only the task itself.
-
-    Raises CoarticError if the base is free already, if the task does not have the goal, or if a
-    displaced goal is out of reach.
+    - If the block has ``free_base``, the base is freed. Raises CoarticError if it is free already.
+    - If the block has ``move``, the list contains a task for each displacement of the goal that
+      ``move`` names. Raises CoarticError if the task does not have this goal, or if the displaced
+      goal is out of reach.
+    - A block can have both. If it has neither, the list contains only the task itself.
     """
 
     def changed(name: str, difference: str, **changes: Any) -> Task:

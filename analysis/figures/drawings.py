@@ -703,10 +703,10 @@ def draw_learning_curves(study: Study) -> Parts | None:
 def learning_curves(study: Study) -> pd.DataFrame:
     """Return the learning curve of each method on each individual task, as means over runs.
 
-    A learning curve is the best reward so far as a function of the number of trials. Only solved
-    runs whose rewards of trials are stored count. The methods are the :func:`.headline_methods`
-    among :data:`CURVES` and methods from files. EC1 has a curve only on tasks on which EC2, EC3 and
-    EC4 have none of these runs.
+    A learning curve is the best reward so far as a function of the number of trials. A run is used
+    only if it is solved and the rewards of its trials are stored. A method has a curve if it is one
+    of the methods in :data:`CURVES` or comes from a file, and if :func:`.headline_methods` keeps it
+    among these methods. EC1 has no curve on tasks on which such runs of EC2, EC3 or EC4 exist.
 
     Returns
     -------
@@ -737,7 +737,8 @@ def learning_curves(study: Study) -> pd.DataFrame:
 def practice_curves(study: Study) -> pd.DataFrame:
     """Return the mean reward of trials in each tenth of practice, in a noisy world.
 
-    Methods and tasks are chosen as in :func:`learning_curves`. Failed trials do not count.
+    Methods and tasks are chosen as in :func:`learning_curves`, except that a run is used if its
+    practice is stored. Failed trials are left out of means.
 
     Returns
     -------
@@ -766,7 +767,8 @@ def _runs_with_curves(
 ) -> Iterator[tuple[str, str, pd.DataFrame]]:
     """Yield the task, the method's label, and the solved runs of each learning curve.
 
-    Only runs whose ids are in ``run_ids`` count (:func:`learning_curves`).
+    Only runs whose ids are in ``run_ids`` are used. :func:`learning_curves` says which methods have
+    a curve.
     """
     cells = {
         (task, label): runs

@@ -362,7 +362,7 @@ def panels_for_page(plot: Plot) -> list[str]:
 
     The elements refer to parts of the element that :func:`for_page` returns. Call that function
     first, and put its element on the same page. The list is empty if the figure has only one panel,
-    or if a panel does not show the names of its rows.
+    or if a panel with axes has no labels on its y axis, because it shares those of another panel.
     """
     drawing, canvas = plot.figure, plot.figure.canvas
     panels = [axes for axes in drawing.axes if axes.has_data()]

@@ -70,7 +70,8 @@ def look_of(method: str) -> Look:
     Parameters
     ----------
     method : str
-        Id of a built-in method that represents its algorithm, such as ``"cma-es/bandit"``.
+        Id of a built-in method, such as ``"cma-es/bandit"``. Of the methods that share an
+        algorithm, only the one that figures show for this algorithm has a look.
 
     Returns
     -------
@@ -80,7 +81,7 @@ def look_of(method: str) -> Look:
     Raises
     ------
     KeyError
-        ``method`` is another id.
+        The method has no look.
 
     Examples
     --------

@@ -46,7 +46,8 @@ def families(incomplete: str = "") -> list[str]:
 def methods(incomplete: str = "") -> list[str]:
     """Return names of the built-in methods: ids, exploration conditions and titles.
 
-    Titles with a blank are left out.
+    Condition ``custom`` and titles with a blank are left out. ``incomplete``, what the user has
+    typed so far, is ignored: Typer itself selects the names that begin with it.
     """
     from coartic.method import built_in_methods
 

@@ -34,10 +34,9 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files into a folder, and remove files that an earlier call wrote there.
+    """Write files into a folder, and remove files of an earlier call that are not in ``files``.
 
-    Files of an earlier call that are not in ``files`` are removed. Files that coartic did not write
-    are never changed.
+    Files that coartic did not write are never changed.
 
     Parameters
     ----------

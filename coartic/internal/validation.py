@@ -117,5 +117,8 @@ def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool =
 
 
 def described_error(text: str) -> PydanticCustomError:
-    """Return a validation error whose message is ``text``, without key and value."""
+    """Return a validation error whose message is only ``text``.
+
+    The message does not name the field that is wrong, or its value.
+    """
     return PydanticCustomError("sentence", "{text}", {"text": text})

@@ -56,8 +56,7 @@ _MAX_BATCH_TRIALS = 4_000_000  # trials of runs whose rewards fit into one answe
 def runs_at_once(trials: int) -> int:
     """Return how many runs of ``trials`` trials a job of a worker has at most.
 
-    The runs of a job together make at most 4,000,000 trials. The number is at least 1 and at most
-    72.
+    The number is from 1 to 72. A job of more than one run makes at most 4,000,000 trials in all.
 
     Examples
     --------
@@ -92,10 +91,11 @@ def learn(
         Number of trials, including trial 0.
     model : MotionModel
     start : sequence of Movement
-        A first solution, such as that of a planner or of an earlier run. In trial 0 the robot
-        moves, for each goal, straight to the target of the first movement of this solution. If the
-        hand misses the goal, or if the movement has no target, the corrective process acts. Without
-        a first solution, only the corrective process acts in trial 0.
+        A first solution, such as that of a planner or of an earlier run. In trial 0 the robot makes
+        a straight movement for each goal, to the target of the first movement that the first
+        solution has for this goal. If the hand misses the goal, or if that movement has no target,
+        the corrective process acts. Without a first solution, only the corrective process acts in
+        trial 0.
 
     Returns
     -------

@@ -77,12 +77,12 @@ class LearningRun:
 
     @property
     def learned(self) -> tuple[Movement, ...]:
-        """Movements of the learned solution; empty if its trial did not hit every goal.
+        """Movements of the learned solution; empty if there is none.
 
         - Without motor noise, the learned solution is the best trial, or the replay if the
-          condition has ``learned="replay"``.
-        - With motor noise the best trial was partly lucky. So the learned solution is
-          :attr:`next_action`.
+          condition has ``learned="replay"``. It is empty if this trial did not hit every goal.
+        - With motor noise, the best trial is partly luck. So the learned solution is
+          :attr:`next_action`, which was not executed. It is empty only if no trial was completed.
         """
         if self.model.motor_noise > 0.0:
             return self.next_action

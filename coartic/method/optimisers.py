@@ -101,8 +101,9 @@ def _entries_of(name: str, points: ArrayLike) -> Array:
 class Objective:
     """The cost of a trial (its ticks) as a function of its target configurations.
 
-    A point has, goal by goal, the targets of the entries of a configuration that are explored
-    (:func:`explored_joints`), in length units (base) and rad (joints).
+    A point is a vector of ``dim`` numbers, in length units (base) and rad (joints). For each goal
+    in turn, it contains the target of each explored entry of a configuration
+    (:func:`explored_joints`).
 
     - The cost of a point is minus the reward of its trial, or ``FAILED`` if the trial fails or
       takes more than ``FAILED`` ticks.
@@ -121,8 +122,8 @@ class Objective:
     up. The best of these sequences becomes :attr:`hands`, the default hand sequence of all points.
 
     Threads can share an objective; their calls are executed one after the other. Copying an
-    objective, or using it in a forked process, raises CoarticError, because the budget would not
-    count those trials.
+    objective, or using it in a forked process, raises CoarticError, because trials of a copy or of
+    another process would not be subtracted from the budget.
 
     Parameters
     ----------
@@ -603,8 +604,8 @@ class Objective:
     def _trials_left(self, count: int) -> int:
         """Return how many of ``count`` trials the budget allows.
 
-        Raises BudgetError if ``count`` is above 0 and no trial is left, and CoarticError in
-        another process.
+        Raises BudgetError if ``count`` is above 0 and no trial is left, and CoarticError if the
+        objective was made in another process.
         """
         if os.getpid() != self._process:
             raise CoarticError(NO_COPIES)

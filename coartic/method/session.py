@@ -606,7 +606,8 @@ class Session:
         """Return hand sequences as integer codes (0 left, 1 right), shape ``(count, G)``.
 
         ``hands`` is one hand sequence for all trials, or one sequence for each trial. Raises
-        ValueError if ``hands`` does not fit the task, or has another number than ``count``.
+        ValueError if a sequence does not fit the task, or if there is neither one sequence nor
+        ``count`` sequences.
         """
         return hand_codes(self._task, hands, count)
 
@@ -664,8 +665,8 @@ class Session:
         """Find the hand sequence of the first trial, such as ``"RRRR"``.
 
         If the task names a sequence, that sequence is returned. If the task names a policy, the
-        session tries the corrective process on its own with each candidate sequence, and returns
-        the sequence with the highest reward. The candidates are
+        session tries the corrective process on its own with each candidate sequence, without motor
+        noise, and returns the sequence with the highest reward. The candidates are
 
         - ``"best-single-hand"``: the sequences of one hand;
         - ``"best-of-all"``: all sequences.

@@ -175,9 +175,9 @@ def follow(
 def scale_base(changes: Array, model: MotionModel) -> Array:
     """Multiply the base coordinates of changes of a configuration by the weight of the base.
 
-    ``changes`` and the result have shape ``(..., dof)``. The norm of a row of the result, in the
-    norm of the model, is the length of a straight movement by this change. If the weight is 1,
-    ``changes`` itself is returned.
+    ``changes`` and the result have shape ``(..., dof)``. The length of the straight movement that
+    makes the change in a row of ``changes`` is the norm of the same row of the result. The norm is
+    that of ``model``. If the weight is 1, ``changes`` itself is returned.
     """
     if model.base_weight == 1.0:
         return changes

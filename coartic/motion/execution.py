@@ -621,10 +621,12 @@ def _plan_of(task: Task, number: int, solution: Iterable[Movement]) -> Plan:
 
 
 def _check_ticks(task: Task, number: int, plan: Plan, ticks: float) -> None:
-    """Check that the movements of a solution have the ticks that they take without noise.
+    """Check that a solution's stored ticks are those of its execution without noise.
 
-    ``ticks`` is the number of ticks of the execution, or NaN if it fails. Nothing is checked if a
-    movement of the solution has no ticks. Raises SolutionError if the numbers differ.
+    The sum of the ticks that are stored with the movements is compared with ``ticks``, the ticks of
+    the execution (NaN if the execution fails). Nothing is checked if a movement has no stored
+    ticks. Raises SolutionError if the two numbers differ; ``number`` is the index of the solution
+    in the error message.
     """
     stored = [movement.ticks for movements in plan for movement in movements]
     counts = [count for count in stored if count is not None]

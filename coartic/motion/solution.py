@@ -106,8 +106,8 @@ of a suite is something else.)"""
 def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     """Check a solution, and return a list of its movements for each goal.
 
-    In the result, the target of a path is its last waypoint, and locked base coordinates of targets
-    have their values at the task's start.
+    In the result, the target of a movement of kind ``path`` is its last waypoint. Where the base is
+    locked, the base coordinates of each target are those of the task's start configuration.
 
     Parameters
     ----------

@@ -59,7 +59,10 @@ path from the start through all targets and waypoints."""
 
 @dataclass(frozen=True)
 class Times:
-    """Time and memory of a run. The runs of a job share its time equally."""
+    """Time that a run took, and memory of the process that made it.
+
+    The time of a job is divided equally among the runs of the job.
+    """
 
     wall_s: float | None = None
     """Wall time (in s); None if unknown."""

@@ -405,7 +405,7 @@ class Store:
             )
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs``: a row for each stored run of the plan, in order.
+        """Return view ``runs``: a row for each stored run of the plan, in the order of the plan.
 
         Returns
         -------

@@ -493,8 +493,9 @@ def task_text(task: Task) -> str:
 def _toml_value(value: Any) -> str:
     """Return a value in the notation of TOML.
 
-    The value is a string of printable characters, a number, a list or a dictionary of such values.
-    It is written as in JSON, except that a dictionary becomes an inline table with bare keys.
+    The value is a string of printable characters, a number, a list without dictionaries, or a
+    dictionary of such values. A dictionary becomes an inline table with bare keys. Any other value
+    is written as in JSON.
     """
     if isinstance(value, dict):
         return (

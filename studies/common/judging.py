@@ -71,7 +71,11 @@ def level_of(values: ArrayLike) -> float:
 
 @dataclass(frozen=True)
 class Finding:
-    """Evidence and tests of one claim, before p-values are adjusted for multiple tests."""
+    """Evidence and tests of one claim.
+
+    The p-values of the tests in :attr:`tests`, :attr:`against` and :attr:`without` are not yet
+    adjusted for multiple tests.
+    """
 
     holds: bool | None
     """True if the means lie where the claim says, otherwise False. It is None if there are too few

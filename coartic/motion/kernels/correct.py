@@ -249,12 +249,17 @@ def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> int:
 def _correct_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None:
     """Correct the first ``count`` runs: phase 4, *correct*.
 
-    The process **A**, kernel ``descend``, looks for a configuration that hits the goal, and the
-    robot moves there; the movement ends as soon as the hand is in the goal. Without noise a run is
-    corrected once. With noise the movement misses, and the run is corrected until it hits the goal,
-    at most 50 times, unless **A** does not converge. ``ticks``, ``corrections`` and ``iterations``
-    of a run become sums over its corrections, 0 if there is none, and ``target`` becomes the
-    configuration that **A** found last.
+    A run is corrected only if it has missed its goal. The process **A**, kernel ``descend``, looks
+    for a configuration that hits the goal, and the robot moves to this configuration. The movement
+    ends as soon as the hand is in the goal.
+
+    - Without noise, a run is corrected once.
+    - With noise, the movement can miss the goal. Then the run is corrected again, until it hits the
+      goal, **A** does not converge, or 50 corrections were made.
+
+    ``ticks``, ``corrections`` and ``iterations`` of a run become sums over the corrections of the
+    run; they are 0 if there was no correction. ``target`` becomes the configuration that **A**
+    found last; it does not change if there was no correction.
     """
     for i in range(count):
         run = batch.runs[i]

@@ -54,8 +54,9 @@ def _links_for(robot: Robot) -> int:
 def width_of(robot: Robot) -> int:
     """Return the number of entries of a robot's configuration in records of kernels.
 
-    The width is that of a robot with two arms of :func:`_links_for` links. The first ``dof``
-    entries are the robot's configuration; the other entries are unused.
+    The width is the number of base coordinates plus the joints of two arms, each with the number of
+    links for which the kernels are compiled (:func:`_links_for`). The first ``dof`` entries are the
+    robot's configuration; the other entries are unused.
     """
     return BASE_DOF + 2 * _links_for(robot)
 

@@ -145,10 +145,10 @@ def count_goal(goal: GoalRecord, counts: Any) -> None:
 
 
 class Requests(NamedTuple):
-    """Requested trials of the kernel: N arms, G goals, and M movements for each goal."""
+    """Requested trials of the kernel: N trials, G goals, and M movements for each goal."""
 
     starts: Configs
-    """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` if all arms start alike."""
+    """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` if all trials start alike."""
     hands: Hands
     """Hand for each goal, 0 left or 1 right, shape ``(N, G)``."""
     targets: Configs
@@ -198,11 +198,12 @@ def _are_within(targets: Any) -> bool:
 def _reach_lot(
     offset: int, count: int, arms: Any, robot: Any, goals: Any, counts: Any, batch: Any
 ) -> None:
-    """Let ``count`` arms from index ``offset`` on reach for their goals, in place.
+    """Make ``count`` of the requested trials, beginning with trial ``offset``, in place.
 
-    ``count`` is at most the number of runs of ``batch``. ``arms`` are :class:`Requests`, and
-    ``robot`` is a :data:`RobotRecord`. This function fills the records ``goals``, shape ``(N, G,
-    M)``, and adds to ``counts``, shape ``(N, 5)``, which the caller has set to 0.
+    ``arms`` is :class:`Requests`, of which each row is a trial. ``count`` is at most the number of
+    runs of ``batch``, and ``robot`` is a :data:`RobotRecord`. This function fills the records
+    ``goals``, shape ``(N, G, M)``, and adds to ``counts``, shape ``(N, 5)``, which the caller has
+    set to 0.
     """
     for i in range(count):
         n, run = offset + i, batch.runs[i]
