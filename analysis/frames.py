@@ -57,7 +57,7 @@ def checked(
     names: Sequence[str] = (),
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
-    """Check a user's frame, and return a copy of the columns that are needed.
+    """Check a user's frame, and return a copy of the columns that are asked for.
 
     If ``numbers`` contains ``reward``, the result has further columns:
 
@@ -83,7 +83,8 @@ def checked(
     Returns
     -------
     DataFrame
-        The checked columns. Their index has no names, because these could be names of columns.
+        The checked columns. The levels of the index have no names, because such a name could also
+        be the name of a column.
 
     Raises
     ------
@@ -243,13 +244,13 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
         A copy of the columns that are needed, with these new or changed columns:
 
         - ``value``, ``gap``, and ``share`` if the frame has ``corrective_best``;
-        - ``method``: name of the method. It includes the setting if the frame has the method with
-          several settings;
+        - ``method``: name of the method. It includes the setting if the method occurs in the frame
+          with several settings;
         - ``task``: number of the task, from 0, in the alphabetical order of the names of tasks;
         - ``key``: number of the run. All rows of one run have the same number. Two rows belong to
-          the same run if they have the same method, the same task, and the same values in those
-          columns of :data:`_SOURCES` that the frame has. If it has none of them, each row is a run
-          of its own.
+          the same run if they agree in method, in task, and in all columns of :data:`_SOURCES` that
+          the frame contains. If the frame contains none of these columns, each row is a run of its
+          own.
 
     Raises
     ------
@@ -376,10 +377,11 @@ def means(
     frame : DataFrame
         A row for each task or for each run. The rows of a group are a sample of independent values.
     by : str or sequence of str
-        Names of the columns whose values define the groups. Rows with NaN in such a column form a
-        group of their own.
+        Names of the columns whose values define the groups. Rows with NaN in one of these columns
+        form groups of their own.
     columns : str or sequence of str
-        Names of the columns of numbers whose means are computed. NaN is left out of means.
+        Names of the columns of numbers whose means are computed. Entries that are NaN are left out
+        of a mean.
 
     Returns
     -------
@@ -443,7 +445,8 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
         - ``share``: mean share of the possible gain, a fraction (:func:`shares`); only if the frame
           has ``corrective_best``.
 
-        Each mean is over the runs that have the number, and NaN if no run has it.
+        Runs in which a reward, gap or share is NaN are left out of the mean of that column. A mean
+        is NaN if no run is left.
 
     Raises
     ------
@@ -507,7 +510,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
           than five runs on a task.
         - ``share``, ``share_low``, ``share_high``: mean share of the possible gain
           (:func:`shares`), over the tasks on which something can be gained. ``without_gain`` is the
-          number of the other tasks. Only for a frame with ``corrective_best``.
+          number of tasks on which nothing can be gained. Only for a frame with ``corrective_best``.
         - ``noisy_gap``, ``noisy_gap_low``, ``noisy_gap_high``: mean gap of minus ``noisy_ticks`` to
           the best known reward *without* noise, computed like ``gap``. It is NaN if a run has no
           ``noisy_ticks``. Only for a frame with ``noisy_ticks``.
@@ -518,7 +521,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         - ``note``: the notes on the method's runs, joined by semicolons, each note once. Only for a
           frame with ``note``.
 
-        Tasks without a best known reward do not count in gaps and shares.
+        Tasks without a best known reward are left out of mean gaps and mean shares.
 
     Raises
     ------

@@ -505,9 +505,9 @@ def _groups(*groups: Numbers) -> list[Array]:
 def distance_of_means(first: Array, second: Array) -> float:
     """Return the Euclidean distance between the mean configurations of two contexts.
 
-    ``first`` and ``second`` have the configurations of the runs in each context, shape
-    ``(runs, dof)``. The distance ‖mean(first) − mean(second)‖ mixes length units and rad. Raises
-    ValueError for other shapes.
+    ``first`` and ``second`` contain the configurations of the runs in the two contexts, shape
+    ``(runs, dof)`` each. The distance ‖mean(first) − mean(second)‖ mixes length units and rad.
+    Raises ValueError for other shapes.
     """
     first, second = _groups(first, second)
     return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
@@ -712,9 +712,9 @@ def beyond_p(
 def _means_of(pool: Array, rows: NDArray[Any]) -> tuple[Array, Array]:
     """Return the means of chosen configurations and of the others, for each resample.
 
-    ``pool`` has configurations, shape ``(N, dof)``. Each row of ``rows``, shape ``(rows, k)``, has
-    the indices of the k configurations that a resample chooses. Both means have shape
-    ``(rows, dof)``.
+    ``pool`` contains N configurations, shape ``(N, dof)``. Each row of ``rows``, shape ``(rows,
+    k)``, contains the indices of the k configurations that a resample chooses. Both means have
+    shape ``(rows, dof)``.
     """
     total, chosen = pool[rows].sum(axis=1), rows.shape[1]
     return total / chosen, (pool.sum(axis=0) - total) / (len(pool) - chosen)
@@ -763,8 +763,8 @@ def lean(
     """Return how far postures at a shared goal lean towards the next postures.
 
     In two contexts A and B, the robot hits the same goal (the shared goal), and then another goal
-    in each context. The lean is the fraction of the difference between the next postures that is
-    already there at the shared goal:
+    in each context. The lean is the fraction of the difference between the next postures that
+    already exists at the shared goal:
 
     (p_A − p_B)·(n_A − n_B) / ‖n_A − n_B‖²,
 
@@ -782,8 +782,8 @@ def lean(
     The postures p and n of the same run share the noise of this run, which would look like a lean.
     Therefore the runs are divided into odd and even runs. The lean is computed twice, with p from
     the odd runs and n from the even runs, and the other way round, and the two results are
-    averaged. Noise in n_A − n_B makes a lean smaller: with four coordinates by a ninth if the lean
-    is just applicable, otherwise by less.
+    averaged. Noise in n_A − n_B makes a lean smaller. With four coordinates, a lean that is only
+    just applicable is smaller by a ninth; any other lean is smaller by less.
 
     All numbers except ``apart`` are NaN if the lean is not applicable, that is, if
 
@@ -864,8 +864,9 @@ def lean(
     def shares(means: Sequence[Sequence[Array]]) -> Array:
         """Return the leans at the start and at the goal, shape ``(..., 2)``.
 
-        ``means`` has, for each context, the mean postures of each part of its runs, shape
-        ``(..., 3, k)``. The parts are the odd and the even runs, or all runs (with ``toward``).
+        ``means`` contains, for each context, the mean postures of each part of the runs, shape
+        ``(..., 3, k)``. The parts are the odd and the even runs or, with ``toward``, all runs
+        together.
         """
         differences = [one - other for one, other in zip(*means, strict=True)]
         ways = [way]
@@ -910,7 +911,7 @@ def _postures(runs: Numbers) -> Array:
 def _variance_of_mean(values: Array) -> float:
     """Return the variance of the mean of vectors, summed over their coordinates.
 
-    ``values`` has n vectors of k coordinates, shape ``(n, k)``. The result is 0 if n is 1.
+    ``values`` contains n vectors of k coordinates, shape ``(n, k)``. The result is 0 if n is 1.
     """
     if len(values) < 2:
         return 0.0
@@ -921,8 +922,8 @@ def _means_drawn(runs: Array, rng: np.random.Generator, resamples: int) -> Array
     """Return the means of bootstrap samples of runs, shape ``(resamples, ...)``.
 
     ``runs`` has shape ``(m, ...)``. Each bootstrap sample draws m runs with replacement. The
-    deviations of the means from the mean of ``runs`` are multiplied by √(m / (m − 1)), so that
-    their variance is an unbiased estimate of the variance of a mean.
+    deviations of the means from the mean of ``runs`` are multiplied by √(m / (m − 1)), so that the
+    variance of the results is an unbiased estimate of the variance of a mean.
     """
     mean, m = runs.mean(axis=0), len(runs)
     shares = rng.multinomial(m, np.full(m, 1 / m), size=resamples) / m
@@ -1017,8 +1018,8 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
     the same expectation. A difference between contexts is called motor-equivalent if the first part
     is larger than the second, so that most of the difference does not move the hand.
 
-    Caveat: if differences are small, the radius of the goal bounds the second part, and nothing
-    bounds the first part.
+    Caveat: if differences are small, the radius of the goal bounds the second part, because the
+    hand is inside the goal in both contexts. Nothing bounds the first part.
 
     Parameters
     ----------
@@ -1182,11 +1183,11 @@ class TwoContexts:
         """Lean of the postures at the goal, in the coordinates of ``part``.
 
         The lean (:func:`.lean`) is the fraction of the difference between the next postures of the
-        two contexts that is already there at the shared goal. Its attribute ``more`` is this
-        fraction minus the same fraction at the start of the movement. The coordinates are those of
+        two contexts that already exists at the shared goal. Its attribute ``more`` is this fraction
+        minus the same fraction at the start of the movement. The coordinates are those of
         :func:`coordinates`; for ``"all"``, they are the coordinates that move the hand. In each
-        context, the next goal may be hit with either hand. Only the runs with the more frequent
-        hand count.
+        context, the next goal may be hit with either hand. Only the runs that hit it with the more
+        frequent hand are used.
         """
         kept = coordinates(self.first.task, self.hand, self.part)
         goal, hand = self.goal - 1, HANDS.index(self.hand)

@@ -31,8 +31,9 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
     - ``best known reward`` if at least one reward is not proven, and none is local;
     - ``best of this folder`` if all rewards are local.
 
-    If some rewards are local and others are not, the name is the one of the others, followed by
-    ``or best of this folder``. Raises KeyError for a task without a best known reward.
+    If some rewards are local and others are not, the name is that of the rewards that are not
+    local, followed by ``or best of this folder``. Raises KeyError for a task without a best known
+    reward.
     """
     best = [study.optima[task] for task in tasks]
     others = [known.proven for known in best if known.proven or not known.only_here]
@@ -112,14 +113,15 @@ def ranked_tasks(study: Study) -> tuple[str, ...]:
 def ranking_budget(study: Study) -> int | None:
     """Return the number of trials that ranked methods were asked for, or None.
 
-    The numbers of trials of a method are those in column ``budget`` of its runs. The result is
+    The numbers of trials of a method are the values in column ``budget`` of the runs of the method.
+    The result is
 
     - None if no method has trials, or if a method has runs with different numbers of trials: the
       study then compares these numbers;
-    - otherwise the number that the last command (or, if it named none, the suite's file) asked for,
-      if a method has this number;
-    - otherwise the number that the most algorithms have, and the smallest of these if there is a
-      tie.
+    - otherwise the number of trials that the last command asked for (or the file of the suite, if
+      the command named no number), if a method has this number of trials;
+    - otherwise the number of trials that the largest number of algorithms share; if several numbers
+      tie, the smallest of them.
     """
     runs = compared_runs(study).dropna(subset="budget")
     if runs[["method", "budget"]].drop_duplicates().duplicated("method").any():
@@ -152,8 +154,8 @@ def standings(study: Study) -> pd.DataFrame:
         - how many of a method's solutions, found in the paper's world, can fail with motor noise;
         - in a world with noise, how many executions failed.
 
-        Methods that have runs only in other worlds (:attr:`.Study.elsewhere`) have a row, too, with
-        the reason :data:`NOT_HERE`.
+        The frame also contains a row for each method that has runs only in other worlds
+        (:attr:`.Study.elsewhere`), with the reason :data:`NOT_HERE`.
     """
     runs, budget = compared_runs(study), ranking_budget(study)
     elsewhere = study.elsewhere

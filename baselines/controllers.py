@@ -100,9 +100,8 @@ class Controller(ABC):
         q : ndarray, shape (dof,)
             Configuration at the beginning of the leg.
         aims : tuple of Aim
-            Goal of the leg with its hand, then the goals ahead with theirs.
-        memory
-            Memory at the end of the leg before; None for the first leg.
+            Goal of the leg with its hand, then the goals ahead with theirs. memory Memory at the
+            end of the leg before; None for the first leg.
         """
 
     @abstractmethod
@@ -265,11 +264,13 @@ class Control(Method):
         with the fewest ticks is extended by the movement to the next goal, until the prefix with
         the fewest ticks is a complete sequence. Ties are broken by the smaller number of changes of
         hand, then by the order of the sequences. Hand sequences with a common prefix share the
-        simulation of their movements, as far as they also agree in the hands of the goals ahead.
+        simulation of their movements, as far as the sequences also agree in the hands of the goals
+        ahead.
 
-        The result has a movement for each goal. The details have the numbers of hand sequences, of
-        sequences in which a hand got stuck, of simulated movements, of quadratic programmes, and of
-        control steps, and in how many control steps each level binds.
+        The result contains a movement for each goal. The details contain the numbers of hand
+        sequences, of sequences in which a hand got stuck, of simulated movements, of quadratic
+        programmes and of control steps, and for each level the number of control steps in which it
+        binds.
 
         Raises MethodError if a hand gets stuck in all sequences, or if the solver fails.
         """

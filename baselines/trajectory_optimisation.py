@@ -156,8 +156,8 @@ class TrajectoryOptimisation(Method):
         (:meth:`.Rounding.nearest`). If that fails, the plan is solved again with targets well
         inside the discs of the goals.
 
-        The details have the cost of the cheapest plan and its path length. They also have two dicts
-        keyed by hand sequence: the costs of all plans, and the reasons why IPOPT failed. Raises
+        The details contain the cost and the path length of the cheapest plan, and two dicts keyed
+        by hand sequence: the costs of all plans, and the reasons why IPOPT failed. Raises
         MethodError if IPOPT converges for no hand sequence, or if a goal has no posture in a graph.
         """
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
@@ -218,7 +218,8 @@ class TrajectoryOptimisation(Method):
 
         The starts of a sequence are
 
-        - its cheapest chain in each random graph that has one;
+        - the cheapest chain of the sequence in each random graph that contains a chain of the
+          sequence;
         - with two hands (except for jerk of the hand), copies of these chains in which the idle arm
           moves in equal steps;
         - copies of the first start with noise.

@@ -324,7 +324,7 @@ def tip(artist: Artist, text: str) -> None:
 def legend_line(label: str, **line: Any) -> Line2D:
     """Return an entry for a legend: a line or marker with its label.
 
-    ``line`` has the look: arguments of Matplotlib's ``Line2D``.
+    ``line`` are arguments of Matplotlib's ``Line2D``, which set the look of the entry.
     """
     return Line2D([], [], label=label, **line)
 
