@@ -239,8 +239,9 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
 def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
     """Return the ids of the methods in the user's files that nothing names.
 
-    These are all methods of each file of which neither the request (``methods``) nor a block of the
-    suite names a method. The wildcard ``"*"`` of the request does not count as naming a method.
+    If neither the request (``methods``) nor a block of the suite names a method of a file, all
+    methods of this file are returned. The wildcard ``"*"`` of the request does not count as naming
+    a method.
     """
     files = {
         registered[method].where
@@ -462,8 +463,8 @@ def _job_of(
     - the world: the block or the suite (``world``), the request, the paper's world;
     - the limit of CPU time: the request, the suite.
 
-    A method that is not stochastic has only run 0; it has no runs if the runs of the request do not
-    begin at 0.
+    A method that is not stochastic has only run 0. Its job has no runs if the runs of the request
+    do not begin at 0.
     """
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:

@@ -45,8 +45,8 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
     Raises
     ------
     CoarticError
-        A file cannot be loaded or has no method, or the id of a method is not allowed
-        (:func:`check_id`).
+        A file cannot be loaded or defines no method (:func:`.read_file`), or the id of a method is
+        not allowed (:func:`check_id`).
     """
     infos = dict(built_in())
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):

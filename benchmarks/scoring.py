@@ -33,10 +33,10 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Row]:
 
     - A part that is too long or breaks the rules of the task is not executed; the run then has
       status ``solver-failed``.
-    - Only runs whose final status is ``ok`` have movements and a score.
+    - Movements and a score are returned only for runs whose final status is ``ok``.
     - In a world with motor noise, only the solution is scored: the movements that the method
-      recommends to make next. They are stored without ticks, and corrective movements without
-      targets.
+      recommends to make next. These movements are stored without ticks, and corrective movements
+      also without targets.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def with_noise(runs: Sequence[Row]) -> list[Row]:
 def _judge(runs: Sequence[Row], answers: Sequence[Sequence[Movement]]) -> list[dict[str, Any]]:
     """Return ``mean_ticks`` and ``failed_executions`` of each run in a world with motor noise.
 
-    ``answers`` has the recommended solution of each run. All runs must be of one cell.
+    ``answers`` contains the recommended solution of each run. All runs must be of one cell.
     """
     cell = runs[0].cell
     seeds = [run.job.judge_seed(run["run"]) for run in runs]

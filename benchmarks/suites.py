@@ -60,8 +60,8 @@ _Number = Annotated[int, Field(ge=1, strict=True)]
 def _worlds(value: Any) -> tuple[MotionModel, ...]:
     """Validate a table ``model``, and return the worlds that it describes.
 
-    The table maps constants (:data:`.WORLD`) to a value or to a list of values. The result has a
-    world for each combination of the values. A tuple of worlds is returned unchanged. Raises a
+    The table maps constants (:data:`.WORLD`) to a value or to a list of values. The result contains
+    a world for each combination of the values. A tuple of worlds is returned unchanged. Raises a
     validation error for an unknown constant, a wrong value or an empty table.
     """
     if isinstance(value, tuple) and all(isinstance(world, MotionModel) for world in value):
@@ -268,7 +268,8 @@ def _read_suite(path: Path) -> Suite:
 def errors_of_block(suite: Suite, number: int) -> Iterator[None]:
     """Add a suite's name and a block's number to errors of a ``with`` block.
 
-    The message of each CoarticError begins with them. ``number`` counts the blocks from 1.
+    The message of each CoarticError begins with the name of the suite and the number of the block,
+    ``number``, from 1.
     """
     try:
         yield
