@@ -154,8 +154,8 @@ def learn_many(
 ) -> list[LearningRun]:
     """Run the learner once for each of many seeds, as :func:`learn` does.
 
-    The runs are made side by side and in threads, which takes less time, but does not change their
-    results.
+    The runs are made side by side and in threads. This takes less time, but does not change the
+    results of the runs.
 
     Parameters
     ----------
@@ -243,9 +243,9 @@ def _learn_together(
 ) -> list[LearningRun]:
     """Run the learner side by side for at most 72 seeds, without checks.
 
-    Return the runs in the order of seeds. ``initial`` has the movement for each goal in trial 0; if
-    a movement has no target, only the corrective process acts at this goal. With ``trials`` 0 the
-    kernels are compiled, the rewards are empty, and the replay is trial 0.
+    Return the runs in the order of seeds. ``initial`` contains the movement for each goal in trial
+    0; if a movement has no target, only the corrective process acts at this goal. With ``trials`` 0
+    the kernels are compiled, the rewards are empty, and the replay is trial 0.
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)

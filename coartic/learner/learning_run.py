@@ -137,8 +137,8 @@ class LearningRun:
         """Total reward of the best trial or of the replay; None without a solution.
 
         It is the reward of the replay if the condition has ``learned="replay"``, and otherwise the
-        highest reward of all trials. With motor noise this single trial was partly lucky: to judge
-        :attr:`learned`, execute it by :func:`coartic.execute_noisy`.
+        highest reward of all trials. With motor noise, the reward of this single trial is partly
+        luck: to judge :attr:`learned`, execute it by :func:`coartic.execute_noisy`.
         """
         if self.condition.learned == "replay":
             return self.replay_reward

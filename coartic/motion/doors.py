@@ -201,8 +201,8 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
     Returns
     -------
     ndarray, shape (n + 1, dof)
-        Configurations of a movement of n steps, including both ends. They are equal to those of the
-        kernels, bit for bit.
+        Configurations of a movement of n steps, including both ends. The kernels compute the same
+        configurations, bit for bit.
 
     Examples
     --------
@@ -369,9 +369,9 @@ def correct(
     Returns
     -------
     Correction
-        The configuration, whether its hand is at the goal, and how many iterations the process
-        took. If the process does not converge within ``model.max_iterations``, ``converged`` is
-        False, and no error is raised.
+        The configuration, whether the hand is at the goal in this configuration, and how many
+        iterations the process took. If the process does not converge within
+        ``model.max_iterations``, ``converged`` is False, and no error is raised.
 
     Raises
     ------

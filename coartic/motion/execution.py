@@ -1,9 +1,9 @@
 """Execute solutions: make the movements of a solution, and score them.
 
 A solution is executed from the task's start by the rule of :mod:`coartic.motion.kernels.trial`, and
-each control tick counts. If the movements miss a goal, the corrective process moves the hand into
-the goal. The score of a solution is the reward of this execution; a reward that a method itself
-reports does not count.
+the control ticks of all movements are counted. If the movements miss a goal, the corrective process
+moves the hand into the goal. The score of a solution is the reward of this execution; a reward that
+a method itself reports is ignored.
 
 :func:`execute` executes a solution without noise, :func:`execute_noisy` many times with motor
 noise.
@@ -115,8 +115,9 @@ def execute(
 ) -> Execution:
     """Execute a solution from the task's start, and score it.
 
-    If the movements for a goal miss it, the corrective process starts from the robot's present
-    configuration and makes a corrective movement, whose ticks count.
+    If the movements for a goal miss the goal, the corrective process starts from the robot's
+    present configuration and makes a corrective movement. The ticks of this movement are counted,
+    too.
 
     Parameters
     ----------
@@ -140,7 +141,7 @@ def execute(
         The solution breaks a rule of the task:
 
         - goals are missing or out of order;
-        - the task does not have a movement's hand;
+        - the hand of a movement is not a hand of the task;
         - a target has the wrong shape or is not finite;
         - a locked base moves by more than 1e-6.
     ValueError
@@ -180,7 +181,7 @@ def execute_many(
     -------
     list
         For each solution, in order, its Execution. For a solution that cannot be executed, the
-        entry is the error that :func:`execute` would raise, which is not raised here.
+        entry is an exception: the one that :func:`execute` would raise. It is not raised here.
     """
     executions: list[Plan | Refused] = []
     for solution in solutions:
@@ -211,9 +212,9 @@ def _with_targets(movements: list[Movement], corrective: float = math.inf) -> li
     """Return the movements for a goal that are made before the corrective process acts.
 
     These are the movements with targets, up to the first movement without a target or, if that
-    comes earlier, up to the corrective movement after ``corrective`` others. If the first movement
-    is corrective, the list begins with None, which stands for a check whether the hand is in the
-    goal already.
+    comes earlier, up to the corrective movement that follows ``corrective`` other movements. If the
+    first movement is corrective, the list begins with None, which stands for a check whether the
+    hand is in the goal already.
     """
     aimed: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:
@@ -443,30 +444,30 @@ def execute_noisy(
         Number R of executions of each solution.
     seed : int or iterable of int
         Seed of the noise, from 0 to 2^128 - 1: one seed for all solutions, or one for each. With
-        one seed, the r-th executions of all solutions have the same noise (*common random
+        one seed, execution number r is made with the same noise for all solutions (*common random
         numbers*). The ticks of a solution depend neither on the other solutions nor on ``repeats``.
     model : MotionModel
-        The motion model of the executions. Its own ``motor_noise`` must be 0.
+        The motion model of the executions. Its constant ``motor_noise`` must be 0.
     signal_dependent : bool
         True if the noise of aimed movements grows with their length. The noise of corrections
-        always does.
+        always grows with their length.
 
     Returns
     -------
     ndarray, shape (K, R)
         Control ticks of each execution; NaN if the execution failed. An execution fails if the
         corrective process does not converge, or if a goal is still missed after 50 corrections. If
-        a solution has failures, report their number as well, because the mean over its other
-        executions is too low.
+        executions of a solution fail, report the number of failures as well, because the mean over
+        all other executions is too low.
 
     Raises
     ------
     TaskError, TypeError
         The task cannot be used, or an argument has another type.
     SolutionError
-        A solution breaks the task's rules, as in :func:`coartic.execute`. Or the ticks stored in
-        its movements differ from the ticks on this task with this model, for example because the
-        solution belongs to another task.
+        A solution breaks the task's rules, as in :func:`coartic.execute`. Or the sum of the ticks
+        stored in its movements differs from the ticks that it takes on this task with this model,
+        for example because the solution belongs to another task.
     ValueError
         ``motor_noise``, ``repeats``, ``seed`` or a constant of the model is out of bounds, the
         model has motor noise, or the number of seeds is not the number of solutions.
@@ -600,8 +601,8 @@ def _is_found(goal: np.void, target: Array) -> bool:
     """Return whether the corrective process itself finds the target of a corrective movement.
 
     ``goal`` is the record of the goal in an execution in which the process acts in place of the
-    corrective movement to ``target``. The result is True, too, if the movement is not made, because
-    the goal is hit already.
+    corrective movement to ``target``. The result is also True if no movement is made, because the
+    goal is hit already.
     """
     if goal["corrections"] == 0:
         return bool(goal["hit"])
@@ -612,7 +613,8 @@ def _is_found(goal: np.void, target: Array) -> bool:
 def _plan_of(task: Task, number: int, solution: Iterable[Movement]) -> Plan:
     """Return the movements of ``solutions[number]`` for each goal.
 
-    Raises SolutionError, with this number in the message, if the solution breaks the task's rules.
+    Raises SolutionError, whose message contains ``number``, if the solution breaks the task's
+    rules.
     """
     try:
         return movements_by_goal(task, solution)

@@ -46,7 +46,7 @@ class Trajectory:
 
     @property
     def hands(self) -> tuple[Hand, ...]:
-        """Name of the hand for each goal; ``execution.hands`` has the letters."""
+        """Name of the hand for each goal; the string ``execution.hands`` has first letters."""
         return hands_of(self.execution.hands)
 
     @property
@@ -90,7 +90,7 @@ class Trajectory:
         - ``left_x``, ``left_y``, ``right_x`` and ``right_y`` (in length units): the positions of
           both hands.
 
-        ``attrs["units"]`` has the units.
+        ``attrs["units"]`` is a dict that maps columns to units.
         """
         import pandas as pd
 

@@ -154,8 +154,8 @@ def cell_of(
     task : Task
     method : MethodInfo
     parameters : mapping of str to object
-        Dict that maps parameters of the method to values. Parameters that are not passed have their
-        defaults.
+        Dict that maps parameters of the method to values. For a parameter that is not passed, the
+        default is used.
     trials : int, optional
         Default of parameter ``trials``, for methods that have it.
     trial_budget : int, optional
@@ -205,7 +205,7 @@ def judge_seed(suite_seed: int, task: str, number: int) -> int:
     """Return the seed of the noise for scoring run ``number`` of a task.
 
     The seed is a hash of the suite's seed, the task's name, the run's number and the word *judge*.
-    All methods have the same seed, and no method sees noise with this seed in its own trials.
+    The seed is the same for all methods, and no method sees noise with this seed in its own trials.
     """
     return _seed_of(suite_seed, f"{task} judge", number)
 

@@ -1,6 +1,6 @@
 """Data layout with which the compiled kernels move many arms side by side.
 
-- A *run* is a robot that makes a trial. A *batch* has a record for each of its runs.
+- A *run* is a robot that makes a trial. A *batch* contains a record for each of its runs.
 - A *slot* is a column of some arrays. It holds the arm of a run while the arm moves or is corrected
   (structure of arrays).
 
@@ -142,7 +142,7 @@ def robot_parameters(
 def arm_of(robot: RobotRecord, hand: int) -> Arm:
     """Return the :class:`Arm` of a hand (0 left, 1 right) from a robot's record.
 
-    Its links share memory with the record, which comes from :func:`robot_parameters`.
+    The links of the arm share memory with the record, which comes from :func:`robot_parameters`.
     """
     arm = robot.arms[hand]
     return Arm(arm.first_joint, arm.links[: arm.count], arm.shoulder_x, arm.shoulder_y)
@@ -168,8 +168,9 @@ class Batch(NamedTuple):
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
     """Return a new batch for kernels, with all entries 0.
 
-    The batch has ``count`` records of runs with room for the links of ``robot``, and arrays of 72
-    slots (:data:`SLOTS`). Each run needs a slot, so a kernel moves at most 72 runs at a time.
+    The batch consists of ``count`` records of runs with room for the links of ``robot``, and of
+    arrays of 72 slots (:data:`SLOTS`). Each run needs a slot, so a kernel moves at most 72 runs at
+    a time.
     """
     width = width_of(robot)
     fields = {
@@ -216,7 +217,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     Returns
     -------
     record : dtype
-        The type of the record. A row has a number for each slot.
+        The type of the record. A row contains a number for each slot.
     corrected, moved : slice
         The rows that a correction needs, and the rows that a movement needs.
     """
@@ -369,8 +370,8 @@ def padded_count(count: int) -> int:
 def winding(q: Any, slot: int) -> float:
     """Return an upper bound on the absolute link angles of an arm (in rad).
 
-    The bound is the sum of the sizes of the joint angles of the arm in a slot. ``q`` has a column
-    for each slot.
+    The bound is the sum of the sizes of the joint angles of the arm in a slot. ``q`` contains a
+    column for each slot.
     """
     total = 0.0
     for k in range(len(q) - BASE_DOF):
