@@ -9,8 +9,8 @@ compared runs have
   hands itself. It is compared with all runs of the form of random search that tries all hand
   sequences;
 - the same treatment of the idle arm, if possible. A learner adds exploration noise to the idle arm
-  if its condition has ``modify_other`` (EC2 and EC4). If the folder has no random search without
-  noise on the idle arm, random search with this noise is used instead;
+  if its condition has ``modify_other`` (EC2 and EC4). If the folder contains no runs of random
+  search without noise on the idle arm, random search with such noise is used instead;
 - the same number of trials;
 - a solution. A solved run that did not improve on the corrective process is compared, too; its
   signature is often 0.
@@ -67,7 +67,7 @@ def with_control(
         - A hand sequence is included if at least a tenth of the method's solved runs have both this
           sequence and a value of the signature. The most frequent sequence comes first.
         - Runs in which the signature is NaN are left out of both arrays.
-        - The second array is empty if the folder has no such random search.
+        - The second array is empty if the folder contains no such runs of random search.
         - Signature ``hand`` has at most one key, the empty string, for all hand sequences together.
         - Only the first 500 solved runs of each method are used.
 

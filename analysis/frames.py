@@ -65,9 +65,9 @@ def checked(
       it, ``mean_ticks``;
     - ``is_noisy``: True for a run whose ``motor_noise`` is above 0; False for all runs if the frame
       does not have this column;
-    - ``status``, if the frame has it. It is checked against the value: a run with status ``ok``
-      must have a reward or mean ticks (in noise both can be missing, :func:`.judge`), and a run
-      with another status must have neither.
+    - ``status``, if the frame contains this column. The status is checked against the value: for a
+      run with status ``ok``, the reward or the mean ticks must be given (in noise both can be
+      missing, :func:`.judge`); for a run with any other status, both must be missing.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def inline(name: object) -> str:
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
     """Return an argument that names columns as a list of names.
 
-    A string counts as one name. Raises CoarticError if the argument is neither a string nor an
+    A string is treated as one name. Raises CoarticError if the argument is neither a string nor an
     iterable of names. ``what`` is the name of the argument in the error message.
     """
     if isinstance(names, str):
@@ -481,7 +481,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
 
         - ``setting``: setting of the method. A method with several settings has a row of the
           ranking for each setting, such as ``"cma-es/bandit noise=0.1"``;
-        - ``ranked_as``: name of the row of the ranking in which the run counts. It is used instead
+        - ``ranked_as``: name of the row of the ranking to which the run belongs. It is used instead
           of ``method`` and ``setting``;
         - ``corrective_best``: reward of the corrective process alone with its best hands, which
           shares need (:func:`shares`);

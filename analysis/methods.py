@@ -346,7 +346,7 @@ def _group_with(information: Collection[str]) -> str:
 
 
 def ranked_as(runs: pd.DataFrame) -> pd.Series:
-    """Return the name of the row of the ranking in which each run counts.
+    """Return the name of the row of the ranking to which each run belongs.
 
     The name is the label of the run (column ``label``), with one exception. The learner needs one
     condition for tasks with one arm and another condition for tasks with two arms. If both

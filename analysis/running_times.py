@@ -293,8 +293,8 @@ def times_of(
 def solve_times(runs: pd.DataFrame) -> pd.Series:
     """Return the wall time of solving of each run in a warm process.
 
-    A process is warm if it has performed the method before, so that compiling does not count. If no
-    run was made in a warm process, the times of all runs are returned.
+    A process is warm if it has performed the method before, so that its time does not include
+    compiling. If no run was made in a warm process, the times of all runs are returned.
 
     Parameters
     ----------
@@ -420,7 +420,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
         A row for each improvement of a run (or only a row for its end), with the columns
 
         - ``method``, ``task`` and ``run``: names of the method and the task, and name or number of
-          the run. If there is a column ``setting``, each setting of a method counts as a method;
+          the run. If there is a column ``setting``, each setting of a method is treated as a method
+          of its own;
         - ``trials``: number of trials that the run had made, from 1;
         - ``reward``: best reward of the run so far, negative ticks; NaN for a failed run;
         - ``best_known``: best known reward of the task, negative ticks.

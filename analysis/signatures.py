@@ -213,7 +213,7 @@ def gain_at_next(runs: Solutions) -> Array:
     - q' = R(q(i, g − 1), g, h(i, g)) is the posture in which the corrective process would have hit
       goal g;
     - q'' is the posture q(i, g) of the run, but with the joints of the idle arm as in q', so that
-      movements of the idle arm do not count.
+      movements of the idle arm have no effect.
 
     The value is positive if the corrective process reaches the next goal in fewer ticks from q''
     than from q'. It is NaN if one of the three reaches ends without a hit.
@@ -343,9 +343,9 @@ def hand(runs: Solutions) -> Array:
     """Return the share of goals that a run hits with a slower hand, shape ``(n,)``.
 
     The chosen hand is slower if the corrective process would reach this goal, on its own, in fewer
-    ticks with another hand. For run i, the share is 1 minus the mean over the goals g < G of
-    a(i, g) (:func:`as_in_isolation`), a fraction. The last goal does not count. The share is NaN on
-    a task for one hand, and on a task with one goal.
+    ticks with another hand. For run i, the share is 1 minus the mean over the goals g < G of a(i,
+    g) (:func:`as_in_isolation`), a fraction. The last goal is left out. The share is NaN on a task
+    for one hand, and on a task with one goal.
     """
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
@@ -389,9 +389,9 @@ def arm(runs: Solutions) -> Array:
     """Return the mean number of ticks that postures save for the next goal.
 
     The posture is compared with the posture in which the corrective process would have hit the
-    goal. Only the base and the arm that hits the goal count. The result has a mean for each run, in
-    ticks, shape ``(n,)``: the mean of :func:`gain_at_next` over the goals g < G. It is NaN on a
-    task with one goal, and for a run in which a value of :func:`gain_at_next` is NaN.
+    goal. Only the base and the arm that hits the goal are considered. The result is a mean for each
+    run, in ticks, shape ``(n,)``: the mean of :func:`gain_at_next` over the goals g < G. It is NaN
+    on a task with one goal, and for a run in which a value of :func:`gain_at_next` is NaN.
     """
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
@@ -491,7 +491,7 @@ IN_MEMORY = 500
 def _groups(*groups: Numbers) -> list[Array]:
     """Return groups of runs as arrays of float64, shape ``(runs, dof)`` each.
 
-    Raises ValueError if a group has another shape or no run, or if the groups differ in ``dof``.
+    Raises ValueError if a group has a wrong shape or no run, or if the groups differ in ``dof``.
     """
     shapes = [np.shape(group) for group in groups]
     if any(len(shape) != 2 or shape[1:] != shapes[0][1:] or 0 in shape for shape in shapes):
@@ -536,7 +536,7 @@ def standardised_posture_difference(first: Array, second: Array) -> float:
     Raises
     ------
     ValueError
-        An array has another shape.
+        An array has a wrong shape.
     """
     first, second = _groups(first, second)
     freedom = len(first) + len(second) - 2
@@ -572,8 +572,8 @@ def posture_difference_below(
         Generator of the bootstrap samples.
     standardised : bool
         True if the posture difference is :func:`standardised_posture_difference`, False if it is
-        :func:`distance_of_means`. If True, the posture difference of a bootstrap sample whose SD is
-        0 counts as at least ``bound``.
+        :func:`distance_of_means`. If True, a bootstrap sample whose SD is 0 is treated as one whose
+        posture difference is at least ``bound``.
     resamples : int
         Number of bootstrap samples.
 
@@ -585,7 +585,7 @@ def posture_difference_below(
     Raises
     ------
     ValueError
-        An array has another shape.
+        An array has a wrong shape.
     """
     groups = _groups(first, second)
     if min(map(len, groups)) < 2:
@@ -627,7 +627,7 @@ def permutation_p(
     Raises
     ------
     ValueError
-        An array has another shape.
+        An array has a wrong shape.
     """
     first, second = _groups(first, second)
     if min(len(first), len(second)) < 2:
@@ -675,7 +675,7 @@ def beyond_p(
     Raises
     ------
     ValueError
-        A method does not have two contexts, or an array has another shape.
+        A method does not have two contexts, or an array has a wrong shape.
 
     Examples
     --------
@@ -820,7 +820,7 @@ def lean(
     Raises
     ------
     ValueError
-        An array has another shape or is empty, the two contexts have different numbers of
+        An array has a wrong shape or is empty, the two contexts have different numbers of
         coordinates, or a posture is not finite.
 
     Examples
@@ -983,7 +983,7 @@ def coordinates(task: Task, hand: Hand, part: Part) -> Array:
     task : Task
         Task whose robot has the coordinates.
     hand : {"left", "right"}
-        Hand whose arm counts.
+        Hand whose arm is considered.
     part : {"all", "base", "joints"}
         - ``"base"``: both coordinates of the base, locked or not, in length units;
         - ``"joints"``: the joints of the hand's arm, in rad;
@@ -1037,7 +1037,7 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
     Raises
     ------
     ValueError
-        An array has another shape.
+        An array has a wrong shape.
 
     Notes
     -----

@@ -24,7 +24,7 @@ from coartic.runs.record import NOISE_RULE
 def reference(study: Study, tasks: Iterable[str]) -> str:
     """Return what the best known rewards of tasks are called in sentences, such as ``optimum``.
 
-    A reward counts as *local* if it is not proven to be the optimum, and is known only from methods
+    A reward is called *local* if it is not proven to be the optimum, and is known only from methods
     of this folder. The name is
 
     - ``optimum`` if all rewards are proven, or if there are no tasks;

@@ -445,8 +445,8 @@ def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
     p_values : array_like
         A p-value from 0 to 1 for each test, or NaN for a test that could not be made.
     family : int, optional
-        Number of planned tests. Tests without a p-value then count as tests with p = 1. By default,
-        tests without a p-value do not count.
+        Number of planned tests. If it is given, tests without a p-value are treated as tests with p
+        = 1. By default, they are left out.
 
     Returns
     -------

@@ -432,7 +432,7 @@ class Study:
           ``mean_ticks`` (:func:`.run_values`);
         - ``motor_noise``, ``norm`` and ``base_weight``: constants of the run's world;
         - ``label``: label of the method: its id with its setting;
-        - ``ranked_as``: name of the row of the ranking in which the run counts. It differs from
+        - ``ranked_as``: name of the row of the ranking to which the run belongs. It differs from
           ``label`` if two conditions of the learner, for one arm and for two arms, share a row;
         - ``budget``: the number of trials that was asked for; missing for a method that does not
           use the reward of each trial;
@@ -772,7 +772,7 @@ class Study:
 
         These are all tasks of the study. If more than eight of them are instances of families
         (random tasks), all instances are left out. A changed instance, such as
-        ``two-armed/v1/i017.radius-0.2``, counts as an instance.
+        ``two-armed/v1/i017.radius-0.2``, is treated as an instance.
         """
         drawn = {name for name in self.tasks if address_of(name.partition(".")[0]) is not None}
         left_out = drawn if len(drawn) > 8 else ()

@@ -509,7 +509,7 @@ fraction of the targets that must be reached."""
 def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
     """Count the individual tasks on which each method is better or worse than the learner.
 
-    The learner is EC1 on a task for one arm, and EC4 on a task for two arms. A task counts if
+    The learner is EC1 on a task for one arm, and EC4 on a task for two arms. A task is counted if
 
     - both methods solved all their runs on the task, and
     - the means of their values differ significantly. The p-values are Holm-adjusted over the tasks
@@ -1330,9 +1330,9 @@ def list_family_gaps(study: Study) -> Rows:
     family. If the robots of this family have two arms, ``gap`` is NaN, too.
 
     Column ``instances`` is the number of instances on which all runs of the method are solved, and
-    column ``missing`` is the number of all other instances. Both count instances of families with
-    two arms, or, for a method that ran only on families with one arm, instances of the families on
-    which it ran.
+    column ``missing`` is the number of all other instances. Both are numbers of instances of
+    families with two arms. For a method that ran only on families with one arm, they are numbers of
+    instances of the families on which the method ran.
     """
     solved_runs, rows, families = instance_runs(study), list[tuple[str, Row]](), _instances(study)
     two_armed = {family for family in families if len(study.tasks[families[family][0]].hands) > 1}

@@ -159,8 +159,8 @@ def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: fl
 
     Here R is the best reward of the search so far, n is the number of its generations, N is the
     number of generations of all searches, and c is ``exploration`` times the range of the first
-    rewards of the searches (at least 1 tick). The first trial of a search counts as a generation.
-    Searches whose first trial failed do not take part.
+    rewards of the searches (at least 1 tick). The first trial of a search is counted as a
+    generation. Searches whose first trial failed do not take part.
 
     Parameters
     ----------

@@ -240,8 +240,8 @@ def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> li
     """Return the ids of the methods in the user's files that nothing names.
 
     If neither the request (``methods``) nor a block of the suite names a method of a file, all
-    methods of this file are returned. The wildcard ``"*"`` of the request does not count as naming
-    a method.
+    methods of this file are returned. The wildcard ``"*"`` of the request names no method in this
+    sense.
     """
     files = {
         registered[method].where

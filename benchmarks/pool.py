@@ -112,7 +112,7 @@ class Local:
     ------
     ValueError
         ``jobs`` is neither -1 nor from 1 to 10,000, ``timeout_s`` is not from 0 to 1,000,000, or an
-        argument has another type.
+        argument has a wrong type.
     """
 
     @checked_arguments

@@ -91,7 +91,7 @@ def check_id(name: str, origin: str, registered: Registry) -> None:
           or one of ``._+/-``, or has more than 80 characters;
         - the id begins with ``dual-process/`` or ``optimum/``;
         - the id is a known id, the id of an exploration condition or one of :data:`NAMES`, where
-          upper and lower case count as equal.
+          upper and lower case are treated as equal.
     """
     if not METHOD_NAME.fullmatch(name):
         raise CoarticError(

@@ -191,8 +191,8 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
 def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int, list[str]]:
     """Execute solutions of a folder with motor noise again, and compare the mean ticks.
 
-    The noise of a run has the same seed as in the scoring of the run (:func:`.with_noise`). If the
-    stored ticks of a run follow another version of the rule of noise, they are not compared.
+    The seed of the noise of a run is the same as in the scoring of the run (:func:`.with_noise`).
+    If the stored ticks of a run follow another version of the rule of noise, they are not compared.
 
     Parameters
     ----------

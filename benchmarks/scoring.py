@@ -90,9 +90,9 @@ def with_noise(runs: Sequence[Row]) -> list[Row]:
       motor noise 0.01, or None if one of them fails. The seed of the noise is the hexadecimal
       number before the hyphen in the id of the run.
     - In a world with motor noise, ``mean_ticks`` is the mean number of ticks over the executions in
-      this world, and ``failed_executions`` is the number of failed executions. A failed execution
-      counts as twice the ticks of the corrective process with its best hands. The seed of the noise
-      is :func:`.judge_seed`, the same for all methods.
+      this world, and ``failed_executions`` is the number of failed executions. For a failed
+      execution, twice the ticks of the corrective process with its best hands are used. The seed of
+      the noise is :func:`.judge_seed`, the same for all methods.
     - In any other world nothing is executed.
 
     Parameters

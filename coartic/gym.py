@@ -260,7 +260,7 @@ class TaskEnv(gymnasium.Env):
         ResetNeeded
             The trial has ended, or no trial was begun.
         ValueError
-            The action has another shape, or is not finite.
+            The action has a wrong shape, or is not finite.
         """
         if not self.going:
             raise ResetNeeded("the trial has ended, or none was begun: call reset first")

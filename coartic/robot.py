@@ -124,7 +124,7 @@ class Robot:
     A configuration ``q`` has shape ``(dof,)``: x and y of the base (in length units), the joint
     angles of the left arm and the joint angles of the right arm (in rad, each measured from the
     link before). Methods that accept arrays accept one configuration or many, shape ``(..., dof)``.
-    They raise ValueError if ``q`` has another shape or is not finite, or if a hand is neither
+    They raise ValueError if ``q`` has a wrong shape or is not finite, or if a hand is neither
     ``"left"`` nor ``"right"``.
     """
 

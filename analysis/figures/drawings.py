@@ -714,10 +714,7 @@ def learning_curves(study: Study) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        If there are no curves, it is empty and has no columns. Otherwise its columns are
-
-        - ``task``, ``method`` (label), and ``runs`` (number of runs);
-        - ``trial``: number of trials. There are at most 100 numbers, logarithmically spaced from 1
+        x There are at most 100 numbers, logarithmically spaced from 1
           to the number of trials of the shortest run;
         - ``best``: mean over runs of the best reward so far, in negative ticks. It is NaN until all
           runs have a solution;

@@ -135,8 +135,8 @@ def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
     - ``movements``: a dict for each movement, with ``goal`` (from 0), ``hand`` (index in HANDS),
       ``kind`` and ``target`` (length units and rad).
 
-    It is empty if the cell has no solved run, or if a movement of one of these runs is of kind
-    ``path``.
+    The dict is empty if the cell has no solved run, or if a movement of one of the first 500 solved
+    runs is of kind ``path``.
     """
     cell = study.cells.get(key)
     if cell is None or not len(good := solved(cell)[:MAX_EXECUTED]):

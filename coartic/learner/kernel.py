@@ -490,7 +490,8 @@ def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
     """Compute the return of each goal of a completed trial, in place.
 
     ``returns``, shape ``(G,)``, becomes Σ γ^|h − g| r_h for each goal g, where r_h is minus the
-    ticks of goal h. The sum is over goals h from g on, or over all goals if earlier goals count.
+    ticks of goal h. The sum is over goals h from g on, or over all goals if the condition includes
+    earlier goals.
     """
     earlier, later = 0.0, 0.0
     for number in range(len(trial)):

@@ -111,7 +111,7 @@ def learn(
     CoarticError
         The condition is unknown.
     TypeError
-        ``task``, ``condition`` or ``model`` has another type.
+        ``task``, ``condition`` or ``model`` has a wrong type.
     SolutionError
         The first solution breaks the task's rules.
     ValueError

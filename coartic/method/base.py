@@ -335,7 +335,7 @@ def run_method(
     SolutionError
         The solution is not a sequence.
     TaskError, TypeError
-        The task cannot be used, or has another type.
+        The task cannot be used, or has a wrong type.
     ValueError
         The seed is not an integer from 0 to 2^128 - 1.
     """

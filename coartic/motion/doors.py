@@ -1,8 +1,8 @@
 """Python functions for single movements and corrections, which call the compiled kernels.
 
 A movement is straight in joint space, or follows a path through waypoints. Its length is measured
-in the norm of the motion model, in which a length unit of the base counts as much as
-``base_weight`` rad of a joint.
+in the norm of the motion model, in which a length unit of the base is as long as ``base_weight``
+rad of a joint.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def move(
         - the hand is unknown;
         - a constant of the model is out of bounds, or the model has motor noise.
     TypeError
-        ``robot``, ``model`` or ``stop_on_arrival`` has another type.
+        ``robot``, ``model`` or ``stop_on_arrival`` has a wrong type.
 
     Notes
     -----
@@ -161,7 +161,7 @@ def follow(
         A shape is wrong, the hand is unknown, a number is not finite or out of bounds, or the model
         has motor noise.
     TypeError
-        ``robot`` or ``model`` has another type.
+        ``robot`` or ``model`` has a wrong type.
     """
     batch = one_run(robot, q, hand, goal, radius)
     points = finite_array("waypoints", waypoints, (max(len(waypoints), 1), robot.dof))
@@ -376,7 +376,7 @@ def correct(
     Raises
     ------
     TypeError
-        ``robot`` or ``model`` has another type.
+        ``robot`` or ``model`` has a wrong type.
     ValueError
         An argument cannot be used:
 

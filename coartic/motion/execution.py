@@ -136,7 +136,7 @@ def execute(
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or ``task`` or ``model`` has another type.
+        The task cannot be used, or ``task`` or ``model`` has a wrong type.
     SolutionError
         The solution breaks a rule of the task:
 
@@ -463,7 +463,7 @@ def execute_noisy(
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or an argument has another type.
+        The task cannot be used, or an argument has a wrong type.
     SolutionError
         A solution breaks the task's rules, as in :func:`coartic.execute`. Or the sum of the ticks
         stored in its movements differs from the ticks that it takes on this task with this model,
@@ -489,11 +489,11 @@ def execute_noisy(
       Euclidean distance from q to a. A locked base coordinate keeps a_c.
     - With ``signal_dependent`` all three rows have s min(1, L) instead of s. L is then the
       Euclidean distance from q to the target without noise (for a path, to its last waypoint).
-    - The noisy target counts as the target everywhere: for the hit, for the arrival of an aimed
-      movement, and for the tick that the arrival costs.
+    - The noisy target takes the place of the target everywhere: for the hit, for the arrival of an
+      aimed movement, and for the tick that the arrival costs.
     - A corrective movement of the solution is compared with the corrective process in the execution
-      without noise. If their targets differ by more than 1e-9, the movement counts as an aimed
-      movement, which ends on a hit or at its target.
+      without noise. If the targets of the two differ by more than 1e-9, the movement is treated as
+      an aimed movement, which ends on a hit or at its target.
     - z is a function of the seed, the number of the execution, the goal, the number of the movement
       made for this goal and the coordinate (:mod:`coartic.motion.kernels.noise`).
 
@@ -562,9 +562,10 @@ def _execute_exactly(
 ) -> tuple[list[list[list[Movement | None]]], Array]:
     """Execute plans without noise, and find out which movements are aimed movements.
 
-    A corrective movement with a target counts as made by the corrective process if the process,
-    starting where the robot then stands, finds this target to within 1e-9. Otherwise, and if the
-    process does not converge there, it counts as an aimed movement.
+    A corrective movement with a target is treated as a movement of the corrective process if the
+    process, starting from the configuration in which the robot then stands, finds this target to
+    within 1e-9. Otherwise, and if the process does not converge, the movement is treated as an
+    aimed movement.
 
     Returns
     -------
@@ -677,7 +678,7 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or ``task`` or ``model`` has another type.
+        The task cannot be used, or ``task`` or ``model`` has a wrong type.
     ValueError
         The hands do not fit the task, or a constant of the model is out of bounds.
 
@@ -746,7 +747,7 @@ def initial_hands(
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or ``task`` or ``model`` has another type.
+        The task cannot be used, or ``task`` or ``model`` has a wrong type.
     NotApplicableError
         No sequence that was tried completes the task, or there are more than 4096 sequences to try.
     ValueError

@@ -157,7 +157,7 @@ class Trajectory:
             The file has another suffix, no control tick was made, or the file exists or cannot be
             written.
         ArgumentError
-            An argument has another type, or ``width`` is out of range.
+            An argument has a wrong type, or ``width`` is out of range.
         """
         from coartic.pictures.film import write_film
 

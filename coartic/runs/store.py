@@ -253,10 +253,10 @@ class Store:
         return dict(warnings_by_method)
 
     def imports(self) -> dict[str, list[str]]:
-        """Return a dict that maps the id of each method from a file to the packages that the file
-        imports.
+        """Return the packages that the files of methods import, as a dict keyed by id of method.
 
-        A package is written as its name with its version. All runs of the plan are considered.
+        The values are lists of strings such as ``numpy 2.1.0``. All runs of the plan are
+        considered. Methods whose file imports no package are left out.
         """
         by_method = defaultdict[str, dict[str, None]](dict)
         for method, made, _ in self._packages():
@@ -266,8 +266,7 @@ class Store:
         return {method: sorted(packages) for method, packages in by_method.items() if packages}
 
     def _packages(self) -> Iterator[tuple[str, dict[str, str], dict[str, str]]]:
-        """Yield the packages that the file of a method imports, for each environment of stored
-        runs.
+        """Yield the packages that a method's file imports, for each environment of stored runs.
 
         Yields
         ------

@@ -383,8 +383,8 @@ def winding(q: Any, slot: int) -> float:
 def have_small_angles(slots: SlotArrays, count: int) -> bool:
     """Return whether all link angles in the first ``count`` slots are certainly below 1e5 rad.
 
-    Angles are absolute, from +x (:func:`winding`). Slots that pad the count are included
-    (:func:`padded_count`).
+    Angles are absolute, from +x (:func:`winding`). Slots beyond ``count`` that are computed to fill
+    a vector are included (:func:`padded_count`).
     """
     large = 0
     for i in range(padded_count(count)):
@@ -417,9 +417,9 @@ _far_chains = _chains_by(cosine, sine)
 def find_positions(slots: SlotArrays, count: int, small_angles: bool) -> None:
     """Fill ``x`` and ``y`` of the first ``count`` slots for the configurations ``q``, in place.
 
-    ``x`` and ``y`` are the positions of shoulder, joints and hand (in length units). Slots that pad
-    the count are filled as well. ``small_angles`` may be True only if all absolute link angles are
-    below 1e5 rad.
+    ``x`` and ``y`` are the positions of shoulder, joints and hand (in length units). Slots beyond
+    ``count`` that are computed to fill a vector are filled as well (:func:`padded_count`).
+    ``small_angles`` may be True only if all absolute link angles are below 1e5 rad.
     """
     if small_angles:
         _near_chains(slots, padded_count(count))
