@@ -1,7 +1,7 @@
 """Compute gaps, shares of the possible gain, means and rankings from a DataFrame of results.
 
-``load(folder).runs`` is such a frame, and you can make your own. It has a row for each run, and the
-columns
+``load(folder).runs`` is such a frame, and you can make your own. Such a frame contains a row for
+each run, and the columns
 
 - ``method`` and ``task``;
 - ``reward``: negative ticks, NaN for a failed run;
@@ -494,8 +494,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         - ``world``: name of the run's world, empty for the paper's world. All runs must have the
           same world.
 
-        ``load(folder).runs`` has all of these columns. If the folder has several worlds,
-        ``load(folder).worlds`` has a study for each of them.
+        ``load(folder).runs`` contains all of these columns. If the folder contains several worlds,
+        ``load(folder).worlds`` contains a study for each world.
 
     Returns
     -------

@@ -217,8 +217,8 @@ def methods_of(
     Returns
     -------
     DataFrame
-        The frame is indexed by the label of the method: its id with its setting. It has the columns
-        of :attr:`.Study.methods`.
+        The frame is indexed by the label of the method: its id with its setting. The columns are
+        those of :attr:`.Study.methods`.
     """
     import pandas as pd  # other parts of this module are used without pandas
 

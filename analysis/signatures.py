@@ -13,8 +13,9 @@ Notation, for run i and goal g = 1..G:
 
 A signature of n runs is an array of shape ``(n,)``. It is NaN for a run without this signature.
 
-A configuration has two coordinates in length units (base), and the others in rad (joints).
-Distances between configurations mix the two units, as the joint-space distance of the model does.
+The first two coordinates of a configuration are in length units (base), and all others in rad
+(joints). Distances between configurations mix the two units, as the joint-space distance of the
+model does.
 
 Permutation tests exchange whole runs. Under the null hypothesis that the context has no effect,
 runs are exchangeable. The tests assume no particular distribution.
@@ -103,7 +104,7 @@ class Solutions:
     def against_same_hands(self) -> Array:
         """Ticks of each subtask minus those of the corrective process alone, shape ``(n, G)``.
 
-        In the notation of the module: t(i, g) − c(i, g). The corrective process has the hand
+        In the notation of the module: t(i, g) − c(i, g). The corrective process uses the hand
         sequence of the run. If it does not complete the task with these hands, all values of the
         run are NaN.
         """
@@ -151,7 +152,7 @@ def isolated_reaches(
     Parameters
     ----------
     task : Task
-        Task that has the robot and the goals.
+        Task with the robot and the goals.
     q : ndarray, shape (..., dof)
         Configuration at the start of each reach, in length units and rad.
     goals : array_like of int
@@ -368,7 +369,7 @@ def as_in_isolation(runs: Solutions) -> Array:
 def other_arm(runs: Solutions) -> Array:
     """Return how much nearer the idle hand is to its next goal, on average.
 
-    The result has a fraction for each run, shape ``(n,)``: the mean of :func:`preshaping` over the
+    The result is a fraction for each run, shape ``(n,)``: the mean of :func:`preshaping` over the
     goals at which :func:`preshaping` is not NaN. The fraction is negative if the idle arm moves its
     hand away from its next goal on average. It is NaN
 

@@ -331,10 +331,10 @@ def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
 def _studentised(moments: Array, size: float) -> Array:
     """Return differences divided by the square roots of their variances, shape ``(rows,)``.
 
-    ``moments``, shape ``(2, rows)``, has the differences in its first row and the variances in its
-    second. ``size`` is a bound on the absolute values of the sample. A difference or a variance is
-    replaced by 0 if it is so small, relative to ``size``, that it can be due to rounding. The
-    result is 0 if the difference is 0, and infinite if only the variance is 0.
+    ``moments``, shape ``(2, rows)``, contains the differences in the first row and the variances in
+    the second row. ``size`` is a bound on the absolute values of the sample. A difference or a
+    variance is replaced by 0 if it is so small, relative to ``size``, that it can be due to
+    rounding. The result is 0 if the difference is 0, and infinite if only the variance is 0.
     """
     differences = np.where(np.abs(moments[0]) < NEGLIGIBLE * size, 0.0, moments[0])
     variances = np.where(moments[1] < (NEGLIGIBLE * size) ** 2, 0.0, moments[1])
@@ -486,7 +486,8 @@ this instance, shape ``(runs,)``."""
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
     """Return the mean over tasks and runs, with its interval for other runs.
 
-    All tasks have the same weight: the mean over tasks is of the means over runs.
+    All tasks have the same weight: for each task, the mean over runs is computed first, and then
+    the mean of these means over tasks.
 
     Parameters
     ----------
@@ -513,8 +514,8 @@ def other_tasks(scores: Scores) -> Estimate:
     Parameters
     ----------
     scores : mapping of str to sequence of arrays, shape (runs,)
-        Maps each family to a list of its instances (random tasks). Each instance has an array with
-        a score of each run.
+        Maps each family to a list of its instances (random tasks). The entry for an instance is an
+        array with a score of each run.
 
     Returns
     -------

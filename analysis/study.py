@@ -175,9 +175,9 @@ def _label_in(study: Study, name: str) -> str:
 class Study:
     """The stored results of a folder.
 
-    If the folder has runs in several worlds, :attr:`worlds` has a study for each world. Attributes
-    and functions that compare runs (best known rewards, cells, executed runs, tables and figures)
-    need a study of one world, and otherwise raise CoarticError.
+    If the folder contains runs in several worlds, :attr:`worlds` contains a study for each world.
+    Attributes and functions that compare runs (best known rewards, cells, executed runs, tables and
+    figures) need a study of one world, and otherwise raise CoarticError.
     """
 
     folder: Path
@@ -296,8 +296,8 @@ class Study:
     def varied(self) -> pd.DataFrame:
         """Values of the parameters that the study varies (:func:`.parameters_varied`).
 
-        The frame has a row for each setting, indexed by its label, and a column for each parameter.
-        It is empty if the study does not vary parameters.
+        The frame contains a row for each setting, indexed by the label of the setting, and a column
+        for each parameter. It is empty if the study does not vary parameters.
         """
         return parameters_varied(self.runs, self.declared)
 

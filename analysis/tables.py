@@ -3,8 +3,8 @@
 :data:`TABLES` maps the id of each table to the table. The decorator :func:`table` makes a table
 from a caption, a string that describes its columns, and a function that yields its rows:
 
-- The string has a line for each column, with the name of the column, its heading, its number of
-  decimals, and ``tex`` if LaTeX includes the column.
+- The string contains a line for each column, with the name of the column, its heading, its number
+  of decimals, and ``tex`` if LaTeX includes the column.
 - The function yields a pair for each row: the name of the row, and a dict that maps names of
   columns to values.
 - At least one row must have an entry (which may be NaN) for each column, and each entry of a row
@@ -851,10 +851,10 @@ def values_of_parameters(study: Study) -> dict[str, list[ValueOfParameter]]:
 def gaps_of_settings(study: Study, labels: Sequence[str]) -> pd.Series:
     """Return the mean gap, over settings, of runs with the same task and number.
 
-    Runs of different settings with the same number have the same seed. Therefore their mean is the
-    unit of resampling. ``labels`` are the labels of the settings. The result is a Series of
-    fractions, indexed by task and number of the run. A task and a number are left out if a setting
-    has no run of this number on the task.
+    Runs of different settings with the same number have the same seed. Therefore the mean of their
+    gaps is the unit of resampling. ``labels`` are the labels of the settings. The result is a
+    Series of fractions, indexed by task and number of the run. A task and a number are left out if
+    a setting has no run of this number on the task.
     """
     runs = compared_runs(study)
     runs = runs[runs.label.isin(labels)]

@@ -158,8 +158,9 @@ def straight_path_points(q: Floats, target: Floats, model: Any) -> Floats:
 def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
     """Return the points of a path from ``q`` through waypoints, shape ``(dof, points)``.
 
-    ``waypoints`` has a row for each waypoint, shape ``(waypoints, dof)``. The points are spaced by
-    ``model.step`` along the path, beginning at ``q``; the last point is the end of the path.
+    ``waypoints`` contains a row for each waypoint, shape ``(waypoints, dof)``. The points are
+    spaced by ``model.step`` along the path, beginning at ``q``; the last point is the end of the
+    path.
     """
     corners = np.array([q, *waypoints])
     sizes = scaled(np.diff(corners, axis=0), model)

@@ -153,7 +153,7 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
     CoarticError
         One of these is the case:
 
-        - a task, a method or a family is unknown, or has the name of another one;
+        - a task, a method or a family is unknown, or two of them have the same name;
         - an option or a parameter of a method has a wrong value;
         - ``trials`` or a family file has no effect;
         - ``runs`` asks for runs other than run 0, although no planned method depends on a seed;

@@ -129,8 +129,8 @@ class TaskEnv(gymnasium.Env):
     - in a family whose robots have different numbers of links, for each joint 1 if the robot can
       move it, else 0.
 
-    An action, shape ``(A,)``, has an entry for the hand, if the task has two hands, and an entry
-    for each joint. Entries for joints are clipped to the range from -1 to 1.
+    An action, shape ``(A,)``, consists of an entry for the hand, if the task has two hands, and an
+    entry for each joint. Entries for joints are clipped to the range from -1 to 1.
 
     - For each hand, the corrective process finds a posture in which this hand is at the goal. If
       the entry for the hand is at most 0.5, the hand whose posture is nearer in joint space is
@@ -510,8 +510,8 @@ def score(
         - an agent was trained with wrappers that the environment does not have;
         - a wrapper does not pass on the options of ``reset``.
     ValueError
-        An option is wrong, a policy has the name of another row, or observations would be
-        normalised twice.
+        An option is wrong, the name of a policy is the name of another row, or observations would
+        be normalised twice.
     OSError
         The file of ``vec_normalize`` cannot be read.
 
@@ -838,8 +838,8 @@ def _table(rewards: Mapping[str, Array]) -> pd.DataFrame:
     """Return the table of :func:`score` from the rewards of its rows.
 
     ``rewards`` is a dict that maps the name of each row to its rewards (in ticks), shape ``(tasks,
-    trials)``, with NaN for a failed trial or an unknown reward. The last row has the best known
-    rewards.
+    trials)``, with NaN for a failed trial or an unknown reward. The last row contains the best
+    known rewards.
     """
     (*_, best), rows = rewards.values(), {}
     known = np.isfinite(best[:, 0])

@@ -474,9 +474,9 @@ def draw_shared_goal(study: Study) -> Parts | None:
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
     """Draw the postures of runs at a shared goal, and their mean on each task.
 
-    The result is a list with a frame for each task. A frame has a row for each run: ``task``,
-    ``method``, ``goal``, ``hand``, and a column for each coordinate of the posture (length units
-    and rad).
+    The result is a list with a frame for each task. A frame contains a row for each run, with
+    columns ``task``, ``method``, ``goal`` and ``hand``, and a column for each coordinate of the
+    posture (length units and rad).
     """
     axes.set_axis_off()
     axes.set_aspect("equal")

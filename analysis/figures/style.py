@@ -222,14 +222,14 @@ def means(
         Axes to draw on.
     frame : DataFrame
         A row for each mean, such as the table of :func:`coartic.analysis.means`. Intervals are
-        drawn if the frame has the ends of the interval of column ``y`` in columns whose names end
-        in ``_low`` and ``_high``.
+        drawn if the ends of the intervals of column ``y`` are in columns whose names are ``y`` with
+        the endings ``_low`` and ``_high``.
     x, y : str
         Names of the columns with the x coordinates and with the means.
     by : str
-        Name of the column that says to which group a row belongs. Each group has a line, a colour
-        and a label; a row with NaN in this column is not drawn. If it is empty, all rows belong to
-        one line.
+        Name of the column that says to which group a row belongs. Each group is drawn as a line
+        with a colour and a label of its own; a row with NaN in this column is not drawn. If ``by``
+        is empty, all rows belong to one line.
     scale : float
         Factor by which means and intervals are multiplied: 100 turns a fraction into per cent.
     shift : float

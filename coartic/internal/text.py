@@ -134,7 +134,7 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     Examples
     --------
     >>> unknown("task", "ascendin", ["ascending", "descending"])
-    "unknown task 'ascendin'; did you mean 'ascending'?"
+    "task 'ascendin' is unknown; did you mean 'ascending'?"
     """
     if isinstance(name, str) and (sentence := foreign_file(name)):
         return f"{sentence}."

@@ -5,7 +5,7 @@ trial, the learner chooses a hand, perturbs the target configuration that is sto
 and moves to it. If the hand misses the goal, the corrective process **A** moves it into the goal
 (:mod:`coartic.motion.kernels.trial`).
 
-The learner has a table keyed by state (the goal and the previous hand) and hand. An entry is the
+The learner stores a table keyed by state (the goal and the previous hand) and hand. An entry is the
 value Q and the target q*. A completed trial is compared, in each state that it passed through, with
 all earlier trials that chose the same hand in this state: by the total reward or, in an ablation,
 by the return of the goal. If the trial is better than all of these earlier trials, its reward (or

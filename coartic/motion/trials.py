@@ -51,8 +51,8 @@ class TrialRecords(NamedTuple):
 
 
 SHARE = 14 * SLOTS
-"""Smallest number of arms for which a thread is started. Starting a thread takes as long as about a
-hundred trials."""
+"""Smallest number of trials for which a thread is started. Starting a thread takes as long as about
+a hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 """Pool of batches that no thread uses: a dict that maps :attr:`Robot.max_links` to a list of
 batches."""
@@ -141,7 +141,7 @@ def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> TrialRe
 
 
 class Reached(NamedTuple):
-    """Results of N arms, each of which reached for one goal (:func:`reach_goals`)."""
+    """Results of N reaches, each by one arm for one goal (:func:`reach_goals`)."""
 
     q: Configs
     """Configuration in which each arm ended, shape ``(N, dof)``, in length units and rad."""

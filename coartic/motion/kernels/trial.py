@@ -167,8 +167,8 @@ class Requests(NamedTuple):
     waypoints: Configs
     """Waypoints of all paths, shape ``(W, dof)``."""
     goals: Points
-    """Centres of the goals, shape ``(N, G, 2)``, or ``(1, G, 2)`` if all arms have the same
-    goals."""
+    """Centres of the goals, shape ``(N, G, 2)``, or ``(1, G, 2)`` if the goals are the same for all
+    trials."""
     first: int
     """Index in the task of the first goal of ``goals``, from 0."""
     worlds: NDArray[np.uint64]
