@@ -347,8 +347,9 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Series
         (reward - corrective_best) / (best_known - corrective_best) as a fraction, with the index of
         ``frame``. The share is negative if the corrective process alone is better than the run. It
-        is NaN if one of the three rewards is NaN, or if nothing can be gained: if the best known
-        reward is not above ``corrective_best``, or in noise by less than 1 % of itself.
+        is NaN if one of the three rewards is NaN, or if nothing can be gained. Nothing can be
+        gained if the best known reward is not above ``corrective_best`` or, in a world with noise,
+        is above it by less than 1 % of the best known reward.
 
     Raises
     ------

@@ -143,7 +143,7 @@ def best_known(
 
 
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return how each run's search for the optimum restricted base and other arm.
+    """Return how the search for the optimum in each run restricted the base and the other arm.
 
     Parameters
     ----------
@@ -154,8 +154,8 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         The values of the parameters ``base`` and ``other_arm`` of each run, with the index of
-        ``runs``. For a method that is not a search for the optimum, they are ``task`` and ``free``,
-        even if the method has parameters of these names.
+        ``runs``. For a method that is not a search for the optimum, the two values are ``task`` and
+        ``free``, even if the method has parameters with these names.
     """
     default = {"base": BASE, "other_arm": "free"}
     pairs = [*zip(runs.method, runs.parameters, strict=True)]

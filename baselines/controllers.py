@@ -100,8 +100,9 @@ class Controller(ABC):
         q : ndarray, shape (dof,)
             Configuration at the beginning of the leg.
         aims : tuple of Aim
-            Goal of the leg with its hand, then the goals ahead with theirs. memory Memory at the
-            end of the leg before; None for the first leg.
+            Goal of the leg with its hand, then the goals ahead with theirs.
+        memory
+            Memory at the end of the leg before; None for the first leg.
         """
 
     @abstractmethod

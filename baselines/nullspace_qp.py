@@ -114,8 +114,8 @@ class NextGoalController(HandController):
         """Return the change towards the posture that is due in one control step.
 
         The result is the change from ``q`` to the posture ``memory``, divided by the number of
-        control steps to the goal (at least 1). A change with a norm above 1 is scaled down to norm
-        1. Parameters, shapes and units are those of :meth:`HandController.preferred`.
+        control steps to the goal (at least 1). A change whose norm exceeds 1 is scaled to norm 1.
+        Parameters, shapes and units are those of :meth:`HandController.preferred`.
         """
         path = (memory - q)[self.moving] / self.length
         return np.asarray(path / max(steps, float(np.linalg.norm(path)), 1.0))

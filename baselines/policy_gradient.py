@@ -80,7 +80,7 @@ class PolicyGradientParameters(SequenceParameters):
 
     @property
     def steps(self) -> tuple[int, float, float]:
-        """B, α and β; β is 0 if the spread is fixed."""
+        """The batch size B, and the step sizes α and β; β is 0 if the spread is fixed."""
         batch, step, spread_step = _TUNED[self.spread]
         if self.spread == "learned":
             spread_step = self.spread_step or spread_step

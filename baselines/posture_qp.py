@@ -106,8 +106,8 @@ class PostureController(Controller):
         2. If there is more than one aim, all postures are then moved to shorten the path from ``q``
            through the postures (:meth:`sweep`).
 
-        The descent and the shortening each end after at most 400 steps. If one of them has not
-        converged by then, a posture may miss its goal.
+        Each descent ends after at most 400 steps, and so does the shortening of the path. If one of
+        them has not converged by then, a posture may miss its goal.
 
         Parameters
         ----------

@@ -44,7 +44,7 @@ def include_folders(
     """Copy the runs of other folders into a results folder, and join their plans.
 
     A cell is a method with its parameters on a task. The joined plan consists of the cells of
-    ``plan``, and of each cell of another folder that contains run 0 of the cell. The joined plan
+    ``plan``, and of the cells of the other folders whose run 0 is stored there. The joined plan
     replaces the plan of ``out``. This function performs no missing runs; :func:`.perform` does.
 
     Parameters
@@ -135,9 +135,8 @@ def _join(
       warning says so);
     - it is not in ``plan``, and no folder contains run 0 of the cell.
 
-    The runs of a cell of the joined plan are numbered without gaps from 0: first all runs that
-    ``plan`` asks for, then each further run that is stored in a folder, up to the first run that is
-    stored in no folder.
+    The runs of a cell of the joined plan are numbered from 0 without gaps. They are all runs that
+    ``plan`` asks for, and then each next run, as long as it is stored in one of the folders.
 
     Parameters
     ----------
@@ -295,8 +294,8 @@ def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 def _check_same_results(stores: Mapping[str, Store]) -> None:
     """Raise CoarticError if two results folders have different results of the same run.
 
-    ``stores`` is a dict that maps the name of each folder to its store. If a folder stores only
-    some of the rewards of a run, only these rewards are compared.
+    ``stores`` is a dict that maps the name of each folder to its store. If only some of the rewards
+    of a run are stored in one of the folders, only these rewards are compared.
     """
     first_results = dict[str, tuple[str, str]]()
     for name, store in stores.items():

@@ -153,7 +153,8 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
     CoarticError
         One of these is the case:
 
-        - a task, a method or a family is unknown, or two of them have the same name;
+        - a task, a method or a family is unknown, or two tasks, methods or families have the same
+          name;
         - an option or a parameter of a method has a wrong value;
         - ``trials`` or a family file has no effect;
         - ``runs`` asks for runs other than run 0, although no planned method depends on a seed;
@@ -494,7 +495,7 @@ def _why_nothing_runs(
     request : Request
     idle : sequence of Task
         Tasks that the request names and on which none of the methods runs. The sentence explains
-        only the first of them. If there are none, it explains the tasks of ``jobs``.
+        only the first of them. If ``idle`` is empty, the sentence explains the tasks of ``jobs``.
     methods : iterable of MethodInfo
         The methods that the request asks for.
     jobs : sequence of Job

@@ -63,10 +63,10 @@ _REPEATED = (-signal.SIGKILL, 255)  # exit codes of a process that was killed or
 def process_pool(processes: int, context: Any = PROGRAM_CONTEXT) -> Iterator[ProcessPoolExecutor]:
     """Open a pool of processes that round floating-point numbers like the workers of suites.
 
-    Use this context manager in programs that run methods or proofs themselves. The processes have
-    the environment variables of workers, with which all x86-64 processors with AVX2 round alike. By
-    default each process imports the main program, as ``multiprocessing`` usually does. So call this
-    function behind ``if __name__ == "__main__":``.
+    Use this context manager in programs that run methods or proofs themselves. The processes are
+    started with the environment variables of workers, with which all x86-64 processors with AVX2
+    round alike. By default each process imports the main program, as ``multiprocessing`` usually
+    does. So call this function behind ``if __name__ == "__main__":``.
 
     Parameters
     ----------

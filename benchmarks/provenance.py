@@ -47,8 +47,8 @@ def current_environment() -> dict[str, Any]:
         - ``coartic``, ``python``: versions of coartic and of Python;
         - ``packages``: dict that maps libraries (numpy, scipy, ...) to their versions;
         - ``model_code``: hash of the files of the model (:data:`MODEL_FILES`);
-        - ``commit``: id of the commit of the checkout, and whether files were changed since; None
-          for an installed package;
+        - ``commit``: dict with the id of the commit of the checkout (``id``), and whether tracked
+          files were changed since (``dirty``); None for an installed package;
         - ``platform``, ``processor``: names of the operating system and of the processor;
         - ``cores``: number of cores that this process may use;
         - ``arithmetic``: fingerprint of how libraries round (:func:`arithmetic`);

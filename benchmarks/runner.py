@@ -368,7 +368,7 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 
 
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Divide jobs into smaller jobs, and return these in the order in which workers start them.
+    """Divide jobs into smaller jobs, in the order in which workers should start them.
 
     - *Size.* Many methods need less time for many runs side by side than for the same runs one by
       one. So a job has as many runs as the method allows: :meth:`.Method.max_batch` for a built-in

@@ -90,8 +90,8 @@ class TaskEnv(gymnasium.Env):
     Parameters
     ----------
     task : Task, str or Path
-        A task, or a family: its name, such as ``"two-armed/v1"``, or the path of its file. In each
-        trial of a family, the robot makes one of the instances of the family.
+        A task, or a family: its name, such as ``"two-armed/v1"``, or the path of its file. Each
+        trial of a family is a trial of one of its instances.
     split : {"development", "test", "fresh"}, optional
         Instances of the family: ``"development"`` to train on (the default), ``"test"`` to report
         on, or ``"fresh"`` for the instances of a ``year``.
@@ -498,7 +498,7 @@ def score(
         - ``completed``: share of trials that hit all goals in less than 1,000,000 ticks.
 
         Reward and gap are NaN for a policy that failed in a trial, and where they are unknown.
-        ``attrs["units"]`` is a dict of the units.
+        ``attrs["units"]`` is a dict that maps columns to units.
 
     Raises
     ------

@@ -714,7 +714,10 @@ def learning_curves(study: Study) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        x There are at most 100 numbers, logarithmically spaced from 1
+        If there are no curves, the frame is empty and has no columns. Otherwise the columns are
+
+        - ``task``, ``method`` (label), and ``runs`` (number of runs);
+        - ``trial``: number of trials. There are at most 100 numbers, logarithmically spaced from 1
           to the number of trials of the shortest run;
         - ``best``: mean over runs of the best reward so far, in negative ticks. It is NaN until all
           runs have a solution;
@@ -737,13 +740,14 @@ def learning_curves(study: Study) -> pd.DataFrame:
 def practice_curves(study: Study) -> pd.DataFrame:
     """Return the mean reward of trials in each tenth of practice, in a noisy world.
 
-    Methods and tasks are chosen as in :func:`learning_curves`, except that a run is used if its
-    practice is stored. Failed trials are left out of means.
+    Methods and tasks are chosen as in :func:`learning_curves`, except that a run is used if it is
+    solved and its entry in column ``practice`` of :attr:`.Study.runs` is not missing. Failed trials
+    are left out of means.
 
     Returns
     -------
     DataFrame
-        If there are no curves, it is empty and has no columns. Otherwise its columns are
+        If there are no curves, the frame is empty and has no columns. Otherwise the columns are
 
         - ``task``, ``method`` (label), and ``runs`` (number of runs);
         - ``trial``: number of the trial in the middle of each tenth, for the shortest run;

@@ -78,7 +78,7 @@ def after_commas(words: Words) -> Words:
 def runs(ctx: typer.Context, incomplete: str) -> list[str]:
     """Return the ids of stored runs that begin with the incomplete word.
 
-    The runs are those of the results folder that the command line names.
+    The runs are those of the results folder that is named on the command line.
     """
     from coartic.runs.store import open_store
 

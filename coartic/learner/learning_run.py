@@ -122,7 +122,7 @@ class LearningRun:
 
     @property
     def reason(self) -> str:
-        """Sentence on why the run has no learned solution; empty if it has one."""
+        """Sentence on why the run has no learned solution; empty if there is a learned solution."""
         if self.learned:
             return ""
         if self.best_trial is not None:

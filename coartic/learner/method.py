@@ -236,8 +236,8 @@ class CustomDualProcess(DualProcess):
     def rules(self) -> ExplorationCondition:
         """Return a copy of condition ``base`` in which the parameters change fields.
 
-        A field does not change if its parameter is None. The id of the copy is, for example, ``EC4,
-        changed,``.
+        A field does not change if its parameter is None. The id of the copy is, for example,
+        ``EC4, changed,``.
         """
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
         return _condition_of(base, self.parameters)

@@ -323,9 +323,9 @@ class Objective:
         Returns
         -------
         float or ndarray
-            Number of evaluations until the best cost was at or below each target; infinite if no
-            point has reached the target so far. The result is a float if ``targets`` is a number,
-            otherwise an array of the same shape.
+            Number of evaluations until the best cost was at or below each target. The number is
+            infinite if no point has reached the target so far. The result is a float if ``targets``
+            is a number, otherwise an array of the same shape.
 
         Raises
         ------

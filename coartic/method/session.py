@@ -478,7 +478,7 @@ class Session:
         -------
         Execution
             The execution. If ``Information.CORRECTIVE_PROCESS`` is not declared, the movements of
-            the execution are those of ``solution``, and its configurations are left out.
+            the execution are those of ``solution``, and the execution contains no configurations.
 
         Raises
         ------

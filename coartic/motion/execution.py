@@ -439,7 +439,7 @@ def execute_noisy(
         K solutions of the task, as a list even if there is only one.
     motor_noise : float
         Standard deviation s of the noise, from 0 to 100, in length units (base) and rad (joints).
-        With 0 the ticks are the same as in :func:`coartic.execute`.
+        If it is 0, the ticks are the same as in :func:`coartic.execute`.
     repeats : int
         Number R of executions of each solution.
     seed : int or iterable of int

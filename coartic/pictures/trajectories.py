@@ -46,7 +46,7 @@ class Trajectory:
 
     @property
     def hands(self) -> tuple[Hand, ...]:
-        """Name of the hand for each goal; the string ``execution.hands`` has first letters."""
+        """Name of the hand for each goal, such as ``("right", "left")``."""
         return hands_of(self.execution.hands)
 
     @property

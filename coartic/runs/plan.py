@@ -22,7 +22,7 @@ from coartic.tasks.task import Task
 
 @dataclass(frozen=True)
 class Cell:
-    """A method with its parameters on a task, and its budget of trials."""
+    """A method with its parameters on a task, and the budget of trials of a run."""
 
     task: Task
     method: MethodInfo
@@ -195,8 +195,8 @@ def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
 def run_seed(suite_seed: int, task: str, number: int) -> int:
     """Return the seed of a run.
 
-    The seed depends only on the suite's seed, the task's name and the run's number. It does not
-    depend on the method, so that the runs of two methods are paired.
+    The seed depends only on the suite's seed, the task's name and the run's number. The seed does
+    not depend on the method, so that the runs of two methods are paired.
     """
     return _seed_of(suite_seed, task, number)
 

@@ -454,7 +454,7 @@ def judge(
         Mean ticks; NaN if an execution failed and the corrective process does not complete the
         task with any hands.
     ndarray of int, shape (K,)
-        How many executions failed.
+        Number of executions of each answer that failed.
     """
     exact = model.without_noise()
     ticks = execute_noisy(task, answers, model.motor_noise, executions, seeds, exact)

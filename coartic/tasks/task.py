@@ -372,7 +372,7 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
     """Return a sentence on the first goal that is out of reach, or None.
 
     A goal is out of reach if no hand of the task can come within ``tolerance`` (in length units) of
-    its centre, or if the hand that ``initial_hands`` names for it cannot.
+    its centre, or if the hand that ``initial_hands`` names for the goal cannot.
     """
     named = None if task.initial_is_policy else hands_of(task.initial_hands)
     for index, goal in enumerate(task.goals):
@@ -413,7 +413,7 @@ def check_task(task: Task) -> Task:
 
     The paper's corrective process ends within a tenth of the radius from a goal's centre. Raises
     TaskError if no hand of the task can come that near to a goal, or if the hand that
-    ``initial_hands`` names for a goal cannot.
+    ``initial_hands`` names for a goal cannot come that near to it.
     """
     _, tolerance = PAPER.tolerances(task.radius)
     if (problem := _out_of_reach(task, tolerance)) is not None:

@@ -258,8 +258,9 @@ def _correct_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> N
       goal, **A** does not converge, or 50 corrections were made.
 
     ``ticks``, ``corrections`` and ``iterations`` of a run become sums over the corrections of the
-    run; they are 0 if there was no correction. ``target`` becomes the configuration that **A**
-    found last; it does not change if there was no correction.
+    run; ``iterations`` includes those of a process that does not converge. All three become 0 if
+    the run has not missed its goal. ``target`` becomes the last configuration of the last process
+    **A**; it does not change if the run has not missed its goal.
     """
     for i in range(count):
         run = batch.runs[i]
