@@ -42,8 +42,8 @@ def bibliography(
 ) -> str:
     """Return BibTeX entries for the software, the paper, and the works behind the methods.
 
-    Each work has one entry, even if several methods cite it. A comment line before the entry names
-    the methods for which the work is cited, or another reason, such as ``the paper``.
+    There is one entry for each work, even if several methods cite it. A comment line before the
+    entry names the methods for which the work is cited, or another reason, such as ``the paper``.
 
     Parameters
     ----------
@@ -54,14 +54,14 @@ def bibliography(
         True to add the works on which statistics and signatures are based, and the theories of
         motor control that the pages compare with the methods.
     environment : mapping, optional
-        Environment of a results folder (:attr:`.Study.made_with`). Its version and commit of
-        coartic are cited. By default the version of this program is cited.
+        Environment of a results folder (:attr:`.Study.made_with`). The version and the commit of
+        coartic in this environment are cited. By default the version of this program is cited.
     imports : mapping, optional
         Maps the id of each method from a file to the names and versions of the packages that the
-        file imports (:attr:`.Study.imports`). They are named in a comment line.
+        file imports (:attr:`.Study.imports`). These packages are named in a comment line.
     worlds : sequence of str
-        Worlds of the runs (:attr:`.Study.worlds`); the empty string is the paper's world. The note
-        of the software's entry names all of them if at least one is not the paper's.
+        Worlds of the runs (:attr:`.Study.worlds`); the empty string is the paper's world. If at
+        least one world is not the paper's world, the note of the software's entry names all worlds.
 
     Returns
     -------
@@ -120,7 +120,7 @@ def bibliography(
 def _misc(key: str, **fields: str) -> str:
     """Return a BibTeX entry of type ``@misc``.
 
-    Each keyword argument is a field of the entry and has a line of its own.
+    Each keyword argument is a field of the entry, which is written on a line of its own.
     """
     lines = [f"  {name} = {{{value}}}," for name, value in fields.items()]
     return "\n".join([f"@misc{{{key},", *lines, "}"])

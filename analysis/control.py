@@ -6,13 +6,13 @@ method that selects its solution from trials are compared with those of random s
 compared runs have
 
 - the same hand sequence. There is one exception: the signature ``hand`` measures the choice of
-  hands itself. It is compared with the form of random search that tries all hand sequences, and
-  all runs of this form count;
+  hands itself. It is compared with all runs of the form of random search that tries all hand
+  sequences;
 - the same treatment of the idle arm, if possible. A learner adds exploration noise to the idle arm
-  if its condition has ``modify_other`` (EC2 and EC4). If the folder has no random search without
-  noise on the idle arm, random search with this noise is used instead;
+  if its condition has ``modify_other`` (EC2 and EC4). If the folder contains no runs of random
+  search without noise on the idle arm, random search with such noise is used instead;
 - the same number of trials;
-- a solution. A solved run that did not improve on the corrective process counts, too; its
+- a solution. A solved run that did not improve on the corrective process is compared, too; its
   signature is often 0.
 
 The test is the one-tailed exchange test of the difference between the means over runs.
@@ -61,14 +61,15 @@ def with_control(
     dict of str to (ndarray, ndarray)
         Maps each hand sequence, such as ``"RRLR"``, to two arrays of the signature, in its unit:
         the values of the method's runs, shape ``(n,)``, and the values of the runs of random search
-        (:func:`control_of`), shape ``(m,)``. Both have these hands and the same number of trials.
+        (:func:`control_of`), shape ``(m,)``. The runs of both have this hand sequence and the same
+        number of trials.
 
-        - A hand sequence is included if at least a tenth of the method's solved runs have these
-          hands and the signature. The most frequent sequence comes first.
-        - Runs without the signature are left out of both arrays.
-        - The second array is empty if the folder has no such random search.
+        - A hand sequence is included if at least a tenth of the method's solved runs have both this
+          sequence and a value of the signature. The most frequent sequence comes first.
+        - Runs in which the signature is NaN are left out of both arrays.
+        - The second array is empty if the folder contains no such runs of random search.
         - Signature ``hand`` has at most one key, the empty string, for all hand sequences together.
-        - Only the first 500 solved runs of each method count.
+        - Only the first 500 solved runs of each method are used.
 
     Raises
     ------
@@ -97,10 +98,11 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
     """Return a dict that maps each hand sequence to the signature of its runs.
 
     The hand sequences are in alphabetical order. Each array has shape ``(n,)`` and is in the unit
-    of the signature. It has a value for each run that has these hands and the signature, and is one
-    of the first 500 solved runs of the method on the task. The signature ``hand`` measures the
-    choice of hands itself: its only key is the empty string, for the runs with all hand sequences
-    together. The dict is empty if no run has the signature. The result is cached: do not change it.
+    of the signature. The array contains a value for each run with this hand sequence in which the
+    signature is not NaN, among the first 500 solved runs of the method on the task. The signature
+    ``hand`` measures the choice of hands itself: its only key is the empty string, for the runs
+    with all hand sequences together. The dict is empty if no run has the signature. The result is
+    cached: do not change it.
     """
     values = study.signature(signature, task, label).to_numpy(np.float64)
     hands = np.array(study.cells[task, label].hands.fillna("").tolist(), dtype=object)
@@ -114,8 +116,8 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
 def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool = False) -> str:
     """Return the label of the random search that controls a method on a task.
 
-    This form of random search has the same number of trials as the method. Among these forms, the
-    one that treats the idle arm as the method does is preferred.
+    The result is a form of random search with the same number of trials as the method. If there are
+    several such forms, the one that treats the idle arm as the method does is preferred.
 
     Parameters
     ----------
@@ -220,8 +222,9 @@ def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
     Returns
     -------
     float
-        The mean difference, in the unit of the signature. Only runs count for which
-        :func:`with_control` has runs of random search. It is NaN if there are no such runs.
+        The mean difference, in the unit of the signature. Only runs with a hand sequence for which
+        :func:`with_control` returns runs of random search are used. The mean is NaN if there are no
+        such runs.
 
     Raises
     ------
@@ -257,9 +260,9 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
     -------
     TwoContexts or None
         Runs of random search on the same two tasks, at the same goal, with the same hand and the
-        same part of the posture. They have the same number of trials as the method. On each task,
-        random search has the hand sequence that is most frequent in the method's runs. Only the
-        first 500 solved runs on each task count. The result is None if
+        same part of the posture. Random search makes the same number of trials as the method. On
+        each task, it uses the hand sequence that is most frequent in the method's runs. Only the
+        first 500 solved runs on each task are used. The result is None if
 
         - the method is random search, or cannot select its solution from trials (:func:`selects`);
         - one of the two tasks lacks such runs of random search;
@@ -292,7 +295,7 @@ def shared_goals(study: Study, label: str, *, part: Part = "all") -> Iterator[Tw
 
     Two tasks share goals if they begin with the same goals (:func:`.context_pairs`). There is one
     comparison for each pair of tasks, for each shared goal, and for each hand with which the method
-    hits this goal on both tasks. Only the first 500 solved runs on each task count.
+    hits this goal on both tasks. Only the first 500 solved runs on each task are used.
 
     Parameters
     ----------
@@ -321,7 +324,7 @@ def shared_goals(study: Study, label: str, *, part: Part = "all") -> Iterator[Tw
 
 @lru_cache(maxsize=4)
 def shared_goal(study: Study, *, part: Part = "all") -> TwoContexts | None:
-    """Return the first comparison of :func:`shared_goals` that a method of the study has, or None.
+    """Return the first comparison of :func:`shared_goals` for the methods of a study, or None.
 
     The methods are tried in this order: the paper's learner, methods from files, methods that
     represent their algorithms, and then all other methods. ``part`` names the coordinates of the

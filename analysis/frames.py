@@ -1,7 +1,7 @@
 """Compute gaps, shares of the possible gain, means and rankings from a DataFrame of results.
 
-``load(folder).runs`` is such a frame, and you can make your own. It has a row for each run, and the
-columns
+``load(folder).runs`` is such a frame, and you can make your own. Such a frame contains a row for
+each run, and the columns
 
 - ``method`` and ``task``;
 - ``reward``: negative ticks, NaN for a failed run;
@@ -57,7 +57,7 @@ def checked(
     names: Sequence[str] = (),
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
-    """Check a user's frame, and return a copy of the columns that are needed.
+    """Check a user's frame, and return a copy of the columns that are asked for.
 
     If ``numbers`` contains ``reward``, the result has further columns:
 
@@ -65,9 +65,9 @@ def checked(
       it, ``mean_ticks``;
     - ``is_noisy``: True for a run whose ``motor_noise`` is above 0; False for all runs if the frame
       does not have this column;
-    - ``status``, if the frame has it. It is checked against the value: a run with status ``ok``
-      must have a reward or mean ticks (in noise both can be missing, :func:`.judge`), and a run
-      with another status must have neither.
+    - ``status``, if the frame contains this column. The status is checked against the value: for a
+      run with status ``ok``, the reward or the mean ticks must be given (in noise both can be
+      missing, :func:`.judge`); for a run with any other status, both must be missing.
 
     Parameters
     ----------
@@ -83,7 +83,8 @@ def checked(
     Returns
     -------
     DataFrame
-        The checked columns. Their index has no names, because these could be names of columns.
+        The checked columns. The levels of the index have no names, because such a name could also
+        be the name of a column.
 
     Raises
     ------
@@ -141,7 +142,7 @@ def inline(name: object) -> str:
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
     """Return an argument that names columns as a list of names.
 
-    A string counts as one name. Raises CoarticError if the argument is neither a string nor an
+    A string is treated as one name. Raises CoarticError if the argument is neither a string nor an
     iterable of names. ``what`` is the name of the argument in the error message.
     """
     if isinstance(names, str):
@@ -243,13 +244,13 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
         A copy of the columns that are needed, with these new or changed columns:
 
         - ``value``, ``gap``, and ``share`` if the frame has ``corrective_best``;
-        - ``method``: name of the method. It includes the setting if the frame has the method with
-          several settings;
+        - ``method``: name of the method. It includes the setting if the method occurs in the frame
+          with several settings;
         - ``task``: number of the task, from 0, in the alphabetical order of the names of tasks;
         - ``key``: number of the run. All rows of one run have the same number. Two rows belong to
-          the same run if they have the same method, the same task, and the same values in those
-          columns of :data:`_SOURCES` that the frame has. If it has none of them, each row is a run
-          of its own.
+          the same run if they agree in method, in task, and in all columns of :data:`_SOURCES` that
+          the frame contains. If the frame contains none of these columns, each row is a run of its
+          own.
 
     Raises
     ------
@@ -346,8 +347,9 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Series
         (reward - corrective_best) / (best_known - corrective_best) as a fraction, with the index of
         ``frame``. The share is negative if the corrective process alone is better than the run. It
-        is NaN if one of the three rewards is NaN, or if nothing can be gained: if the best known
-        reward is not above ``corrective_best``, or in noise by less than 1 % of itself.
+        is NaN if one of the three rewards is NaN, or if nothing can be gained. Nothing can be
+        gained if the best known reward is not above ``corrective_best`` or, in a world with noise,
+        is above it by less than 1 % of the best known reward.
 
     Raises
     ------
@@ -376,10 +378,11 @@ def means(
     frame : DataFrame
         A row for each task or for each run. The rows of a group are a sample of independent values.
     by : str or sequence of str
-        Names of the columns whose values define the groups. Rows with NaN in such a column form a
-        group of their own.
+        Names of the columns whose values define the groups. Rows with NaN in one of these columns
+        form groups of their own.
     columns : str or sequence of str
-        Names of the columns of numbers whose means are computed. NaN is left out of means.
+        Names of the columns of numbers whose means are computed. Entries that are NaN are left out
+        of a mean.
 
     Returns
     -------
@@ -443,7 +446,8 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
         - ``share``: mean share of the possible gain, a fraction (:func:`shares`); only if the frame
           has ``corrective_best``.
 
-        Each mean is over the runs that have the number, and NaN if no run has it.
+        Runs in which a reward, gap or share is NaN are left out of the mean of that column. A mean
+        is NaN if no run is left.
 
     Raises
     ------
@@ -478,7 +482,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
 
         - ``setting``: setting of the method. A method with several settings has a row of the
           ranking for each setting, such as ``"cma-es/bandit noise=0.1"``;
-        - ``ranked_as``: name of the row of the ranking in which the run counts. It is used instead
+        - ``ranked_as``: name of the row of the ranking to which the run belongs. It is used instead
           of ``method`` and ``setting``;
         - ``corrective_best``: reward of the corrective process alone with its best hands, which
           shares need (:func:`shares`);
@@ -491,8 +495,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         - ``world``: name of the run's world, empty for the paper's world. All runs must have the
           same world.
 
-        ``load(folder).runs`` has all of these columns. If the folder has several worlds,
-        ``load(folder).worlds`` has a study for each of them.
+        ``load(folder).runs`` contains all of these columns. If the folder contains several worlds,
+        ``load(folder).worlds`` contains a study for each world.
 
     Returns
     -------
@@ -507,7 +511,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
           than five runs on a task.
         - ``share``, ``share_low``, ``share_high``: mean share of the possible gain
           (:func:`shares`), over the tasks on which something can be gained. ``without_gain`` is the
-          number of the other tasks. Only for a frame with ``corrective_best``.
+          number of tasks on which nothing can be gained. Only for a frame with ``corrective_best``.
         - ``noisy_gap``, ``noisy_gap_low``, ``noisy_gap_high``: mean gap of minus ``noisy_ticks`` to
           the best known reward *without* noise, computed like ``gap``. It is NaN if a run has no
           ``noisy_ticks``. Only for a frame with ``noisy_ticks``.
@@ -518,7 +522,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         - ``note``: the notes on the method's runs, joined by semicolons, each note once. Only for a
           frame with ``note``.
 
-        Tasks without a best known reward do not count in gaps and shares.
+        Tasks without a best known reward are left out of mean gaps and mean shares.
 
     Raises
     ------

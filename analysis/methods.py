@@ -202,7 +202,8 @@ def methods_of(
 
     Built-in methods come first, in the order of :data:`.MODULES`. Methods from files follow, in the
     order of the suite. If two conditions of the learner share a row of the ranking
-    (:func:`ranked_as`), they have a further row, which copies most columns of the second condition.
+    (:func:`ranked_as`), the frame contains a further row for both together, which copies most
+    columns of the second condition.
 
     Parameters
     ----------
@@ -216,8 +217,8 @@ def methods_of(
     Returns
     -------
     DataFrame
-        The frame is indexed by the label of the method: its id with its setting. It has the columns
-        of :attr:`.Study.methods`.
+        The frame is indexed by the label of the method: its id with its setting. The columns are
+        those of :attr:`.Study.methods`.
     """
     import pandas as pd  # other parts of this module are used without pandas
 
@@ -322,9 +323,10 @@ def are_numbers(values: Iterable[object]) -> bool:
 def _group_of(runs: pd.DataFrame) -> str:
     """Return the group of a method (one of :data:`GROUPS`), which its declaration and runs decide.
 
-    - ``using the reward of each trial``, if the method declares this and a run made more than one
-      trial;
-    - otherwise ``using the reward as a formula``, if the method declares this;
+    - ``using the reward of each trial``, if the method declares that it uses this information, and
+      a run made more than one trial;
+    - otherwise ``using the reward as a formula``, if the method declares that it uses this
+      information;
     - otherwise ``not using the reward``.
     """
     information = {kind for text in runs.information.unique() for kind in text.split(", ")}
@@ -344,12 +346,13 @@ def _group_with(information: Collection[str]) -> str:
 
 
 def ranked_as(runs: pd.DataFrame) -> pd.Series:
-    """Return the name of the row of the ranking in which each run counts.
+    """Return the name of the row of the ranking to which each run belongs.
 
     The name is the label of the run (column ``label``), with one exception. The learner needs one
-    condition for tasks with one arm and another condition for tasks with two arms. If both have
-    runs, and no task in common, they share a row (:data:`RANKED_TOGETHER`), and all their runs get
-    its name (:func:`joined_label`). The result has the index of ``runs``.
+    condition for tasks with one arm and another condition for tasks with two arms. If both
+    conditions have runs, but no task in common, the two conditions share a row
+    (:data:`RANKED_TOGETHER`), and all runs of both get the name of this row (:func:`joined_label`).
+    The result has the index of ``runs``.
     """
     tasks = {label: {*of_method.task} for label, of_method in runs.groupby("label")}
     names = runs.label
@@ -386,9 +389,9 @@ def _pairs_of(group: str) -> list[tuple[str, str]]:
 def _looks_of_built_in() -> dict[str, tuple[str, str]]:
     """Return a dict that maps ids of built-in methods to colours and markers.
 
-    It has the methods that represent their algorithms. The methods of each group (:data:`GROUPS`)
-    take the pairs of :func:`_pairs_of`, in the order of the methods. The learner for one arm gets
-    the colour of the first learner for two arms in :data:`RANKED_TOGETHER`.
+    It contains only the methods that represent their algorithms. The methods of each group
+    (:data:`GROUPS`) take the pairs of :func:`_pairs_of`, in the order of the methods. The learner
+    for one arm gets the colour of the first learner for two arms in :data:`RANKED_TOGETHER`.
     """
     looks, free = dict[str, tuple[str, str]](), {group: _pairs_of(group) for group in GROUPS}
     headlines = {name: each for name, each in KNOWN_METHODS.items() if each.facts.headline}
@@ -410,8 +413,8 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
     - A row that has a ``style`` already keeps it.
     - The first nine methods from files get the colour :data:`OWN_COLOR`, each with another marker.
-    - Each other row gets the next free pair of its group. Pairs whose colour no ``style`` has come
-      first. After the last free pair, the first one is used again.
+    - Each other row gets the next free pair of its group. Pairs with a colour that does not occur
+      in any ``style`` come first. After the last free pair, the first one is used again.
 
     ``rows`` maps labels to the columns of :attr:`.Study.methods`.
     """
@@ -434,10 +437,11 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return rows of methods without settings and ablations of other methods in these rows.
+    """Leave out the rows that are settings or ablations of another method in ``rows``.
 
     ``rows`` are rows of :attr:`.Study.methods`. Column ``parent`` names the method of which a row
-    is a setting or an ablation. The settings of a study that varies parameters are kept.
+    is a setting or an ablation. In a study that varies parameters, the settings have no parent, and
+    are kept.
     """
     return rows[~rows.parent.isin(rows.index)]
 
@@ -445,7 +449,7 @@ def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
 def headline_methods(rows: pd.DataFrame) -> list[str]:
     """Return the labels of the methods that represent their algorithms.
 
-    If no method in ``rows`` does, all labels are returned. ``rows`` are rows of
+    If no method in ``rows`` represents its algorithm, all labels are returned. ``rows`` are rows of
     :attr:`.Study.methods`; column ``headline`` says which methods represent their algorithms.
     Settings and ablations are left out as in :func:`without_settings`.
     """

@@ -80,8 +80,8 @@ def best_known(
 
     The best known reward is the highest among the shipped reward and the rewards of all solved
     runs, including those of searches for the optimum and runs that were included from other
-    folders. Runs of searches with another base than the task's do not count, because they solve
-    another task. A task is left out if
+    folders. Runs of searches that lock other base coordinates than the task does are left out,
+    because they solve another task. A task is left out if
 
     - its best reward is 0, because the gap is divided by this reward;
     - no reward is known;
@@ -89,8 +89,8 @@ def best_known(
       for the optimum. These runs would be compared with themselves.
 
     In a world with noise, the best of many stored values would be best partly by luck. Therefore
-    the five runs with the best values are executed again with other noise, and the highest of these
-    means counts instead.
+    the five runs with the best values are executed again with other noise, and the highest of the
+    new means is used instead.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def best_known(
 
 
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return how each run's search for the optimum restricted base and other arm.
+    """Return how the search for the optimum in each run restricted the base and the other arm.
 
     Parameters
     ----------
@@ -155,8 +155,8 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         The values of the parameters ``base`` and ``other_arm`` of each run, with the index of
-        ``runs``. For a method that is not a search for the optimum, they are ``task`` and ``free``,
-        even if the method has parameters of these names.
+        ``runs``. For a method that is not a search for the optimum, the two values are ``task`` and
+        ``free``, even if the method has parameters with these names.
     """
     default = {"base": BASE, "other_arm": "free"}
     pairs = [*zip(runs.method, runs.parameters, strict=True)]

@@ -89,7 +89,8 @@ def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
 
         Rows of some hits may be missing. A column of the base may be missing if the task locks the
         base in this coordinate, and the columns of an arm may be missing if its hand is not among
-        ``task.hands``. Missing columns have the values at the start of the task.
+        ``task.hands``. A missing column is filled with the value of its coordinate at the start of
+        the task.
     task : Task
         The task that was practised.
 
@@ -257,7 +258,7 @@ def _table(path: str | Path) -> pd.DataFrame:
 
 
 def _require(frame: pd.DataFrame, columns: list[str], source: str) -> None:
-    """Raise CoarticError if a column is missing or duplicate, or rows are missing.
+    """Raise CoarticError if a frame lacks a column, has a column twice, or has no rows.
 
     ``source`` is the name of the frame in the message.
     """
@@ -380,8 +381,8 @@ def _fit(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
 def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
     """Check whether hits that :func:`_readable` returned fit the task, and return them unchanged.
 
-    - Warns if hits of a subject are more than two radii from the centres of their goals. Raises
-      CoarticError if more than half of the subject's hits are.
+    - Warns if a hit of a subject is more than two radii from the centre of its goal. Raises
+      CoarticError if more than half of the hits of a subject are that far from the centres.
     - Warns if the median movement of a subject takes less than a tenth or more than ten times the
       model's time.
     """

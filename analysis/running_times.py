@@ -54,10 +54,11 @@ def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
     ndarray, shape (k,)
         Running times of the k pairs that are reached, in ascending order.
     ndarray, shape (k,)
-        Weights of these pairs. All tasks have the same weight, and so have all pairs of a task. The
-        weights of all pairs, including those that are not reached, sum to 1.
+        Weight of each of these pairs. All tasks have the same weight, and within a task all pairs
+        have the same weight. The weights of all pairs, reached or not, sum to 1.
     ndarray of int, shape (k,)
-        Numbers of the runs of these pairs. Runs are numbered from 0, continuously over all tasks.
+        Number of the run of each of these pairs. Runs are numbered from 0, continuously over all
+        tasks.
     """
     values = np.concatenate([of_task.ravel() for of_task in times])
     order = np.argsort(values, kind="stable")
@@ -80,8 +81,9 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
     ndarray, shape (k,)
         Budgets at which the ECDF rises, in ascending order, in the unit of ``times``.
     ndarray, shape (k,)
-        Values of the ECDF from each of these budgets on: the fraction of pairs of run and target
-        that are reached. If no target is reached, there is one infinite budget with the value 0.
+        Values of the ECDF from each of these budgets on: on each task, the fraction of pairs of a
+        run and a target in which the run reached the target; averaged over tasks. If no target is
+        reached, there is one infinite budget with the value 0.
     """
     values, weights, _ = _pairs(times)
     if not len(values):
@@ -91,10 +93,11 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
 
 
 def share_reached(times: RunningTimes) -> float:
-    """Return the fraction of pairs of run and target that are reached.
+    """Return the fraction of targets that the runs of a method reach at any cost, from 0 to 1.
 
-    The fraction, from 0 to 1, counts pairs that are reached at any cost. ``times`` has the running
-    times on each task, shape ``(runs, targets)``. All tasks have the same weight.
+    On each task, it is the fraction of pairs of a run and a target in which the run reached the
+    target. The result is the mean of these fractions over tasks. ``times`` contains an array of
+    running times for each task, shape ``(runs, targets)``.
     """
     return float(_pairs(times)[1].sum())
 
@@ -107,13 +110,13 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     times : sequence of arrays, shape (runs, targets)
         Running times on each task. All tasks have the same weight.
     share : float
-        Fraction of all pairs of run and target that must be reached, above 0 and up to 1.
+        Value that the ECDF (:func:`share_by_budget`) must reach, above 0 and up to 1.
 
     Returns
     -------
     Estimate
-        The budget, in the unit of ``times``, with its 95 % interval. The budget is infinite if so
-        many targets are not reached at any cost. The interval is the percentile interval of a
+        The budget, in the unit of ``times``, with its 95 % interval. The budget is infinite if the
+        ECDF does not reach ``share`` at any cost. The interval is the percentile interval of a
         bootstrap that resamples runs within tasks. It is not widened for small numbers of runs,
         because budgets can be infinite. There is no interval if a task has fewer than five runs.
     """
@@ -168,8 +171,8 @@ def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Arra
 def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     """Return how often each bootstrap sample draws each run, shape ``(resamples, runs)``.
 
-    ``sizes`` has the number of runs on each task. There are 1,999 bootstrap samples. For a very
-    large number of runs there are fewer, but at least 200. The array is cached: do not change it.
+    ``sizes`` contains the number of runs on each task. There are 1,999 bootstrap samples, or fewer
+    (at least 200) for a very large number of runs. The array is cached: do not change it.
     """
     rng = np.random.default_rng(SEED)
     resamples = min(FEWER_RESAMPLES, max(_MAX_DRAWN_RUNS // sum(sizes), 200))
@@ -290,8 +293,8 @@ def times_of(
 def solve_times(runs: pd.DataFrame) -> pd.Series:
     """Return the wall time of solving of each run in a warm process.
 
-    A process is warm if it has performed the method before, so that compiling does not count. If no
-    run was made in a warm process, the times of all runs are returned.
+    A process is warm if it has performed the method before, so that its time does not include
+    compiling. If no run was made in a warm process, the times of all runs are returned.
 
     Parameters
     ----------
@@ -362,8 +365,9 @@ def runtimes(
         - ``spend``: the cost: ``trials``, ``forward_kinematics`` (evaluations) or ``solve_s``
           (seconds). The last two are spread evenly over the trials of a run;
         - ``budget``: budget at which the ECDF rises, in the unit of the cost;
-        - ``share``: value of the ECDF from this budget on: the fraction of the pairs of run and
-          target that are reached within the budget.
+        - ``share``: value of the ECDF from this budget on: on each task, the fraction of pairs of
+          a run and a target in which the run reached the target within the budget; averaged over
+          tasks.
 
         A method that reaches no target has one row for each cost, with share 0 and an infinite
         budget. A method whose cost is unknown on a task has no rows for this cost.
@@ -416,7 +420,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
         A row for each improvement of a run (or only a row for its end), with the columns
 
         - ``method``, ``task`` and ``run``: names of the method and the task, and name or number of
-          the run. If there is a column ``setting``, each setting of a method counts as a method;
+          the run. If there is a column ``setting``, each setting of a method is treated as a method
+          of its own;
         - ``trials``: number of trials that the run had made, from 1;
         - ``reward``: best reward of the run so far, negative ticks; NaN for a failed run;
         - ``best_known``: best known reward of the task, negative ticks.
@@ -430,12 +435,14 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
 
         - ``method``: name of the method;
         - ``trials``: number of trials at which the ECDF rises;
-        - ``share``: value of the ECDF from there on: the fraction of all pairs of run and target
-          that are reached within these trials.
+        - ``share``: value of the ECDF from this number of trials on: on each task, the fraction of
+          pairs of a run and a target in which the run reached the target within these trials;
+          averaged over tasks.
 
-        All tasks have the same weight. A run without a reward reaches no target. On a task without
-        runs of the method, no target is reached. A method that reaches no target has one row, with
-        share 0 and infinite trials.
+        All tasks have the same weight, whatever their numbers of runs. Tasks without a best known
+        reward are left out. A run without a reward reaches no target. On a task without runs of the
+        method, no target is reached. A method that reaches no target has one row, with share 0 and
+        infinite trials.
 
     Raises
     ------
@@ -443,7 +450,7 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
         - A column is missing, or a reward is wrong (:func:`ranking`).
         - ``trials`` is below 1, or the reward of a run falls.
         - A target is not from 0 to 1.
-        - The frame has no best known reward.
+        - All entries of column ``best_known`` are missing.
 
     Examples
     --------

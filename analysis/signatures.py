@@ -13,8 +13,9 @@ Notation, for run i and goal g = 1..G:
 
 A signature of n runs is an array of shape ``(n,)``. It is NaN for a run without this signature.
 
-A configuration has two coordinates in length units (base), and the others in rad (joints).
-Distances between configurations mix the two units, as the joint-space distance of the model does.
+The first two coordinates of a configuration are in length units (base), and all others in rad
+(joints). Distances between configurations mix the two units, as the joint-space distance of the
+model does.
 
 Permutation tests exchange whole runs. Under the null hypothesis that the context has no effect,
 runs are exchangeable. The tests assume no particular distribution.
@@ -103,7 +104,7 @@ class Solutions:
     def against_same_hands(self) -> Array:
         """Ticks of each subtask minus those of the corrective process alone, shape ``(n, G)``.
 
-        In the notation of the module: t(i, g) − c(i, g). The corrective process has the hand
+        In the notation of the module: t(i, g) − c(i, g). The corrective process uses the hand
         sequence of the run. If it does not complete the task with these hands, all values of the
         run are NaN.
         """
@@ -151,7 +152,7 @@ def isolated_reaches(
     Parameters
     ----------
     task : Task
-        Task that has the robot and the goals.
+        Task with the robot and the goals.
     q : ndarray, shape (..., dof)
         Configuration at the start of each reach, in length units and rad.
     goals : array_like of int
@@ -173,7 +174,8 @@ def isolated_reaches(
     Raises
     ------
     ValueError
-        A goal's number is out of range, or shapes do not fit.
+        A number of a goal is out of range, a hand is neither 0 nor 1, shapes do not fit, or the
+        model has motor noise.
     """
     q, numbers = np.asarray(q), 1 + np.arange(len(task.goals))
     shape = q.shape[:-1]
@@ -212,7 +214,7 @@ def gain_at_next(runs: Solutions) -> Array:
     - q' = R(q(i, g − 1), g, h(i, g)) is the posture in which the corrective process would have hit
       goal g;
     - q'' is the posture q(i, g) of the run, but with the joints of the idle arm as in q', so that
-      movements of the idle arm do not count.
+      movements of the idle arm have no effect.
 
     The value is positive if the corrective process reaches the next goal in fewer ticks from q''
     than from q'. It is NaN if one of the three reaches ends without a hit.
@@ -342,9 +344,9 @@ def hand(runs: Solutions) -> Array:
     """Return the share of goals that a run hits with a slower hand, shape ``(n,)``.
 
     The chosen hand is slower if the corrective process would reach this goal, on its own, in fewer
-    ticks with another hand. For run i, the share is 1 minus the mean over the goals g < G of
-    a(i, g) (:func:`as_in_isolation`), a fraction. The last goal does not count. The share is NaN on
-    a task for one hand, and on a task with one goal.
+    ticks with another hand. For run i, the share is 1 minus the mean over the goals g < G of a(i,
+    g) (:func:`as_in_isolation`), a fraction. The last goal is left out. The share is NaN on a task
+    for one hand, and on a task with one goal.
     """
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
@@ -367,7 +369,7 @@ def as_in_isolation(runs: Solutions) -> Array:
 def other_arm(runs: Solutions) -> Array:
     """Return how much nearer the idle hand is to its next goal, on average.
 
-    The result has a fraction for each run, shape ``(n,)``: the mean of :func:`preshaping` over the
+    The result is a fraction for each run, shape ``(n,)``: the mean of :func:`preshaping` over the
     goals at which :func:`preshaping` is not NaN. The fraction is negative if the idle arm moves its
     hand away from its next goal on average. It is NaN
 
@@ -388,9 +390,9 @@ def arm(runs: Solutions) -> Array:
     """Return the mean number of ticks that postures save for the next goal.
 
     The posture is compared with the posture in which the corrective process would have hit the
-    goal. Only the base and the arm that hits the goal count. The result has a mean for each run, in
-    ticks, shape ``(n,)``: the mean of :func:`gain_at_next` over the goals g < G. It is NaN on a
-    task with one goal, and for a run in which a value of :func:`gain_at_next` is NaN.
+    goal. Only the base and the arm that hits the goal are considered. The result is a mean for each
+    run, in ticks, shape ``(n,)``: the mean of :func:`gain_at_next` over the goals g < G. It is NaN
+    on a task with one goal, and for a run in which a value of :func:`gain_at_next` is NaN.
     """
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
@@ -490,7 +492,7 @@ IN_MEMORY = 500
 def _groups(*groups: Numbers) -> list[Array]:
     """Return groups of runs as arrays of float64, shape ``(runs, dof)`` each.
 
-    Raises ValueError if a group has another shape or no run, or if the groups differ in ``dof``.
+    Raises ValueError if a group has a wrong shape or no run, or if the groups differ in ``dof``.
     """
     shapes = [np.shape(group) for group in groups]
     if any(len(shape) != 2 or shape[1:] != shapes[0][1:] or 0 in shape for shape in shapes):
@@ -504,9 +506,9 @@ def _groups(*groups: Numbers) -> list[Array]:
 def distance_of_means(first: Array, second: Array) -> float:
     """Return the Euclidean distance between the mean configurations of two contexts.
 
-    ``first`` and ``second`` have the configurations of the runs in each context, shape
-    ``(runs, dof)``. The distance ‖mean(first) − mean(second)‖ mixes length units and rad. Raises
-    ValueError for other shapes.
+    ``first`` and ``second`` contain the configurations of the runs in the two contexts, shape
+    ``(runs, dof)`` each. The distance ‖mean(first) − mean(second)‖ mixes length units and rad.
+    Raises ValueError for other shapes.
     """
     first, second = _groups(first, second)
     return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
@@ -535,7 +537,7 @@ def standardised_posture_difference(first: Array, second: Array) -> float:
     Raises
     ------
     ValueError
-        An array has another shape.
+        An array has a wrong shape.
     """
     first, second = _groups(first, second)
     freedom = len(first) + len(second) - 2
@@ -571,8 +573,8 @@ def posture_difference_below(
         Generator of the bootstrap samples.
     standardised : bool
         True if the posture difference is :func:`standardised_posture_difference`, False if it is
-        :func:`distance_of_means`. If True, the posture difference of a bootstrap sample whose SD is
-        0 counts as at least ``bound``.
+        :func:`distance_of_means`. If True, a bootstrap sample whose SD is 0 is treated as one whose
+        posture difference is at least ``bound``.
     resamples : int
         Number of bootstrap samples.
 
@@ -584,7 +586,7 @@ def posture_difference_below(
     Raises
     ------
     ValueError
-        An array has another shape.
+        An array has a wrong shape.
     """
     groups = _groups(first, second)
     if min(map(len, groups)) < 2:
@@ -626,7 +628,7 @@ def permutation_p(
     Raises
     ------
     ValueError
-        An array has another shape.
+        An array has a wrong shape.
     """
     first, second = _groups(first, second)
     if min(len(first), len(second)) < 2:
@@ -674,7 +676,7 @@ def beyond_p(
     Raises
     ------
     ValueError
-        A method does not have two contexts, or an array has another shape.
+        A method does not have two contexts, or an array has a wrong shape.
 
     Examples
     --------
@@ -711,9 +713,9 @@ def beyond_p(
 def _means_of(pool: Array, rows: NDArray[Any]) -> tuple[Array, Array]:
     """Return the means of chosen configurations and of the others, for each resample.
 
-    ``pool`` has configurations, shape ``(N, dof)``. Each row of ``rows``, shape ``(rows, k)``, has
-    the indices of the k configurations that a resample chooses. Both means have shape
-    ``(rows, dof)``.
+    ``pool`` contains N configurations, shape ``(N, dof)``. Each row of ``rows``, shape ``(rows,
+    k)``, contains the indices of the k configurations that a resample chooses. Both means have
+    shape ``(rows, dof)``.
     """
     total, chosen = pool[rows].sum(axis=1), rows.shape[1]
     return total / chosen, (pool.sum(axis=0) - total) / (len(pool) - chosen)
@@ -762,8 +764,8 @@ def lean(
     """Return how far postures at a shared goal lean towards the next postures.
 
     In two contexts A and B, the robot hits the same goal (the shared goal), and then another goal
-    in each context. The lean is the fraction of the difference between the next postures that is
-    already there at the shared goal:
+    in each context. The lean is the fraction of the difference between the next postures that
+    already exists at the shared goal:
 
     (p_A − p_B)·(n_A − n_B) / ‖n_A − n_B‖²,
 
@@ -781,8 +783,8 @@ def lean(
     The postures p and n of the same run share the noise of this run, which would look like a lean.
     Therefore the runs are divided into odd and even runs. The lean is computed twice, with p from
     the odd runs and n from the even runs, and the other way round, and the two results are
-    averaged. Noise in n_A − n_B makes a lean smaller: with four coordinates by a ninth if the lean
-    is just applicable, otherwise by less.
+    averaged. Noise in n_A − n_B makes a lean smaller. With four coordinates, a lean that is only
+    just applicable is smaller by a ninth; any other lean is smaller by less.
 
     All numbers except ``apart`` are NaN if the lean is not applicable, that is, if
 
@@ -819,7 +821,7 @@ def lean(
     Raises
     ------
     ValueError
-        An array has another shape or is empty, the two contexts have different numbers of
+        An array has a wrong shape or is empty, the two contexts have different numbers of
         coordinates, or a posture is not finite.
 
     Examples
@@ -863,8 +865,9 @@ def lean(
     def shares(means: Sequence[Sequence[Array]]) -> Array:
         """Return the leans at the start and at the goal, shape ``(..., 2)``.
 
-        ``means`` has, for each context, the mean postures of each part of its runs, shape
-        ``(..., 3, k)``. The parts are the odd and the even runs, or all runs (with ``toward``).
+        ``means`` contains, for each context, the mean postures of each part of the runs, shape
+        ``(..., 3, k)``. The parts are the odd and the even runs or, with ``toward``, all runs
+        together.
         """
         differences = [one - other for one, other in zip(*means, strict=True)]
         ways = [way]
@@ -909,7 +912,7 @@ def _postures(runs: Numbers) -> Array:
 def _variance_of_mean(values: Array) -> float:
     """Return the variance of the mean of vectors, summed over their coordinates.
 
-    ``values`` has n vectors of k coordinates, shape ``(n, k)``. The result is 0 if n is 1.
+    ``values`` contains n vectors of k coordinates, shape ``(n, k)``. The result is 0 if n is 1.
     """
     if len(values) < 2:
         return 0.0
@@ -920,8 +923,8 @@ def _means_drawn(runs: Array, rng: np.random.Generator, resamples: int) -> Array
     """Return the means of bootstrap samples of runs, shape ``(resamples, ...)``.
 
     ``runs`` has shape ``(m, ...)``. Each bootstrap sample draws m runs with replacement. The
-    deviations of the means from the mean of ``runs`` are multiplied by √(m / (m − 1)), so that
-    their variance is an unbiased estimate of the variance of a mean.
+    deviations of the means from the mean of ``runs`` are multiplied by √(m / (m − 1)), so that the
+    variance of the results is an unbiased estimate of the variance of a mean.
     """
     mean, m = runs.mean(axis=0), len(runs)
     shares = rng.multinomial(m, np.full(m, 1 / m), size=resamples) / m
@@ -981,7 +984,7 @@ def coordinates(task: Task, hand: Hand, part: Part) -> Array:
     task : Task
         Task whose robot has the coordinates.
     hand : {"left", "right"}
-        Hand whose arm counts.
+        Hand whose arm is considered.
     part : {"all", "base", "joints"}
         - ``"base"``: both coordinates of the base, locked or not, in length units;
         - ``"joints"``: the joints of the hand's arm, in rad;
@@ -1016,8 +1019,8 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
     the same expectation. A difference between contexts is called motor-equivalent if the first part
     is larger than the second, so that most of the difference does not move the hand.
 
-    Caveat: if differences are small, the radius of the goal bounds the second part, and nothing
-    bounds the first part.
+    Caveat: if differences are small, the radius of the goal bounds the second part, because the
+    hand is inside the goal in both contexts. Nothing bounds the first part.
 
     Parameters
     ----------
@@ -1035,7 +1038,7 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
     Raises
     ------
     ValueError
-        An array has another shape.
+        An array has a wrong shape.
 
     Notes
     -----
@@ -1181,11 +1184,11 @@ class TwoContexts:
         """Lean of the postures at the goal, in the coordinates of ``part``.
 
         The lean (:func:`.lean`) is the fraction of the difference between the next postures of the
-        two contexts that is already there at the shared goal. Its attribute ``more`` is this
-        fraction minus the same fraction at the start of the movement. The coordinates are those of
+        two contexts that already exists at the shared goal. Its attribute ``more`` is this fraction
+        minus the same fraction at the start of the movement. The coordinates are those of
         :func:`coordinates`; for ``"all"``, they are the coordinates that move the hand. In each
-        context, the next goal may be hit with either hand. Only the runs with the more frequent
-        hand count.
+        context, the next goal may be hit with either hand. Only the runs that hit it with the more
+        frequent hand are used.
         """
         kept = coordinates(self.first.task, self.hand, self.part)
         goal, hand = self.goal - 1, HANDS.index(self.hand)

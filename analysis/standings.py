@@ -24,15 +24,16 @@ from coartic.runs.record import NOISE_RULE
 def reference(study: Study, tasks: Iterable[str]) -> str:
     """Return what the best known rewards of tasks are called in sentences, such as ``optimum``.
 
-    A reward counts as *local* if it is not proven to be the optimum, and is known only from methods
+    A reward is called *local* if it is not proven to be the optimum, and is known only from methods
     of this folder. The name is
 
     - ``optimum`` if all rewards are proven, or if there are no tasks;
     - ``best known reward`` if at least one reward is not proven, and none is local;
     - ``best of this folder`` if all rewards are local.
 
-    If some rewards are local and others are not, the name is the one of the others, followed by
-    ``or best of this folder``. Raises KeyError for a task without a best known reward.
+    If some rewards are local and others are not, the name is that of the rewards that are not
+    local, followed by ``or best of this folder``. Raises KeyError for a task without a best known
+    reward.
     """
     best = [study.optima[task] for task in tasks]
     others = [known.proven for known in best if known.proven or not known.only_here]
@@ -77,10 +78,12 @@ def runs_by_method(study: Study) -> dict[str, pd.DataFrame]:
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Return the runs of a method on tasks, including failed runs.
+    """Select the runs of a method on given tasks from the runs that the ranking uses.
 
-    ``method`` is the label of the method, or the label of a row of the ranking. The frame is empty
-    if at least one of the tasks has no run of the method.
+    The runs are selected from :func:`compared_runs`, whose errors are raised; failed runs are
+    included. ``method`` is the label of the method, or the label of a row of the ranking. The frame
+    is empty if at least one of the tasks has no such run. It is therefore empty for a search for
+    the optimum, and if one of the tasks has no best known reward.
     """
     runs, tasks = compared_runs(study), {*tasks}
     runs = runs[runs.task.isin(tasks) & ((runs.ranked_as == method) | (runs.label == method))]
@@ -110,14 +113,15 @@ def ranked_tasks(study: Study) -> tuple[str, ...]:
 def ranking_budget(study: Study) -> int | None:
     """Return the number of trials that ranked methods were asked for, or None.
 
-    The numbers of trials of a method are those in column ``budget`` of its runs. The result is
+    The numbers of trials of a method are the values in column ``budget`` of the runs of the method.
+    The result is
 
     - None if no method has trials, or if a method has runs with different numbers of trials: the
       study then compares these numbers;
-    - otherwise the number that the last command (or, if it named none, the suite's file) asked for,
-      if a method has this number;
-    - otherwise the number that the most algorithms have, and the smallest of these if there is a
-      tie.
+    - otherwise the number of trials that the last command asked for (or the file of the suite, if
+      the command named no number), if a method has this number of trials;
+    - otherwise the number of trials that the largest number of algorithms share; if several numbers
+      tie, the smallest of them.
     """
     runs = compared_runs(study).dropna(subset="budget")
     if runs[["method", "budget"]].drop_duplicates().duplicated("method").any():
@@ -150,8 +154,8 @@ def standings(study: Study) -> pd.DataFrame:
         - how many of a method's solutions, found in the paper's world, can fail with motor noise;
         - in a world with noise, how many executions failed.
 
-        Methods that have runs only in other worlds (:attr:`.Study.elsewhere`) have a row, too, with
-        the reason :data:`NOT_HERE`.
+        The frame also contains a row for each method that has runs only in other worlds
+        (:attr:`.Study.elsewhere`), with the reason :data:`NOT_HERE`.
     """
     runs, budget = compared_runs(study), ranking_budget(study)
     elsewhere = study.elsewhere

@@ -298,9 +298,9 @@ def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
     pool : ndarray, shape (N,)
         The values of both samples together, or of the only sample.
     rows : ndarray of int, shape (rows, k)
-        The resamples: each row has the indices in ``pool`` of the values of one sample. This is the
-        first sample if k = n, otherwise the second. If k = N, there is only one sample, and each
-        row draws from it with replacement.
+        The resamples: each row contains the indices in ``pool`` of the values of one of the two
+        samples: the first sample if k = n, otherwise the second. If k = N, there is only one
+        sample, and each row draws from it with replacement.
     n : int
         Number of values of the first sample.
 
@@ -331,10 +331,10 @@ def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
 def _studentised(moments: Array, size: float) -> Array:
     """Return differences divided by the square roots of their variances, shape ``(rows,)``.
 
-    ``moments``, shape ``(2, rows)``, has the differences in its first row and the variances in its
-    second. ``size`` is a bound on the absolute values of the sample. Differences and variances that
-    are so small, relative to it, that they can be due to rounding count as 0. The result is 0 if
-    the difference is 0, and infinite if only the variance is 0.
+    ``moments``, shape ``(2, rows)``, contains the differences in the first row and the variances in
+    the second row. ``size`` is a bound on the absolute values of the sample. A difference or a
+    variance is replaced by 0 if it is so small, relative to ``size``, that it can be due to
+    rounding. The result is 0 if the difference is 0, and infinite if only the variance is 0.
     """
     differences = np.where(np.abs(moments[0]) < NEGLIGIBLE * size, 0.0, moments[0])
     variances = np.where(moments[1] < (NEGLIGIBLE * size) ** 2, 0.0, moments[1])
@@ -345,9 +345,9 @@ def _studentised(moments: Array, size: float) -> Array:
 def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
     """Count the statistics of resamples that are at least as extreme as the observed statistic.
 
-    ``null`` has the statistics of the resamples, shape ``(n,)``. A statistic is extreme if it is
-    high (alternative ``"greater"``), low (``"less"``), or far from 0 (``"two-sided"``). A statistic
-    that equals the observed one, up to rounding, counts.
+    ``null`` contains the statistics of the resamples, shape ``(n,)``. A statistic is extreme if it
+    is high (alternative ``"greater"``), low (``"less"``), or far from 0 (``"two-sided"``). A
+    statistic that equals the observed statistic, up to rounding, is counted as well.
     """
     if alternative == "two-sided":
         null, observed = np.abs(null), abs(observed)
@@ -358,7 +358,7 @@ def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
 def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.int32]:
     """Draw random subsets of the indices 0 to ``runs`` - 1.
 
-    Each of the ``size`` rows has ``chosen`` indices, drawn without replacement. The result has
+    Each of the ``size`` rows contains ``chosen`` indices, drawn without replacement. The result has
     shape ``(size, chosen)``.
     """
     order = rng.random((size, runs)).argpartition(chosen - 1, axis=1)
@@ -371,8 +371,8 @@ def places(
     """Yield the indices of resamples in chunks that fit into the processor's cache.
 
     Each chunk is a pair: the slice of the resamples that it contains, and an array of shape
-    ``(resamples in the chunk, chosen)``. Each row of the array is a resample. It has ``chosen`` of
-    the indices 0 to ``runs`` - 1:
+    ``(resamples in the chunk, chosen)``. Each row of the array is a resample: ``chosen`` of the
+    indices 0 to ``runs`` - 1.
 
     - If ``exact`` is True, the rows are all combinations of ``chosen`` indices, and ``resamples``
       must be the number of combinations.
@@ -445,8 +445,8 @@ def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
     p_values : array_like
         A p-value from 0 to 1 for each test, or NaN for a test that could not be made.
     family : int, optional
-        Number of planned tests. Tests without a p-value then count as tests with p = 1. By default,
-        tests without a p-value do not count.
+        Number of planned tests. If it is given, tests without a p-value are treated as tests with p
+        = 1. By default, they are left out.
 
     Returns
     -------
@@ -486,7 +486,8 @@ this instance, shape ``(runs,)``."""
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
     """Return the mean over tasks and runs, with its interval for other runs.
 
-    All tasks have the same weight: the mean over tasks is of the means over runs.
+    All tasks have the same weight: for each task, the mean over runs is computed first, and then
+    the mean of these means over tasks.
 
     Parameters
     ----------
@@ -513,16 +514,16 @@ def other_tasks(scores: Scores) -> Estimate:
     Parameters
     ----------
     scores : mapping of str to sequence of arrays, shape (runs,)
-        Maps each family to a list of its instances (random tasks). Each instance has an array with
-        a score of each run.
+        Maps each family to a list of its instances (random tasks). The entry for an instance is an
+        array with a score of each run.
 
     Returns
     -------
     Estimate
         ``value`` is the mean over families of the mean over instances of the mean over runs. Its
-        95 % interval, ``low`` to ``high``, is for other tasks of the same families. All are in the
-        unit of the scores. ``n`` has the number of instances of each family. The ends of the
-        interval are NaN if a family has fewer than three instances.
+        95 % interval, ``low`` to ``high``, is for other tasks of the same families. All three
+        numbers are in the unit of the scores. ``n`` is a tuple of the numbers of instances of the
+        families. The ends of the interval are NaN if a family has fewer than three instances.
 
     Raises
     ------

@@ -76,7 +76,7 @@ def _labelled(stored: pd.DataFrame) -> pd.DataFrame:
 def solved(runs: pd.DataFrame) -> pd.DataFrame:
     """Return the runs that have a solution (status ``ok``).
 
-    If all runs have one, the frame itself is returned.
+    If all runs have a solution, the frame itself is returned.
     """
     is_solved = runs.status.to_numpy() == "ok"
     return runs if is_solved.all() else runs[is_solved]
@@ -156,7 +156,7 @@ def _label_in(study: Study, name: str) -> str:
 
     The name is looked up first among the labels of the study's methods, then among their ids, and
     then among their titles. An id of the learner can be shortened to its condition, such as
-    ``EC4``. Raises CoarticError if no method, or more than one, has the name.
+    ``EC4``. Raises CoarticError if the name refers to no method, or to more than one.
     """
     methods = study.methods
     for names in (methods.index, methods.method_id, methods.title):
@@ -175,9 +175,9 @@ def _label_in(study: Study, name: str) -> str:
 class Study:
     """The stored results of a folder.
 
-    If the folder has runs in several worlds, :attr:`worlds` has a study for each world. Attributes
-    and functions that compare runs (best known rewards, cells, executed runs, tables and figures)
-    need a study of one world, and otherwise raise CoarticError.
+    If the folder contains runs in several worlds, :attr:`worlds` contains a study for each world.
+    Attributes and functions that compare runs (best known rewards, cells, executed runs, tables and
+    figures) need a study of one world, and otherwise raise CoarticError.
     """
 
     folder: Path
@@ -214,7 +214,7 @@ class Study:
     def worlds(self) -> dict[str, Study]:
         """A dict that maps each world of the folder to a study of its runs.
 
-        A key names the constants in which the world differs from the paper's, such as
+        A key names the constants in which the world differs from the paper's world, such as
         ``motor_noise=0.01``. The key of the paper's world is the empty string. The paper's world
         comes first, and the others follow in the order of the suite. For a study of one world, the
         only value is the study itself.
@@ -246,8 +246,8 @@ class Study:
     def world(self) -> str:
         """Name of the study's world, such as ``motor_noise=0.01``; empty for the paper's world.
 
-        The name has the constants in which the world differs from the paper's. Raises CoarticError
-        for a study of several worlds.
+        The name consists of the constants in which the world differs from the paper's world. Raises
+        CoarticError for a study of several worlds.
         """
         names = [*dict.fromkeys(job.cell.world for job in self.plan)]
         if len(names) > 1:
@@ -296,8 +296,8 @@ class Study:
     def varied(self) -> pd.DataFrame:
         """Values of the parameters that the study varies (:func:`.parameters_varied`).
 
-        The frame has a row for each setting, indexed by its label, and a column for each parameter.
-        It is empty if the study does not vary parameters.
+        The frame contains a row for each setting, indexed by the label of the setting, and a column
+        for each parameter. It is empty if the study does not vary parameters.
         """
         return parameters_varied(self.runs, self.declared)
 
@@ -320,11 +320,11 @@ class Study:
     def optima(self) -> dict[str, BestKnown]:
         """A dict that maps each task's name to its best known reward.
 
-        A best known reward has its bound and its source. Tasks without a best known reward are left
-        out (:func:`.best_known`). If the reward of the corrective process with its best hands is
-        higher than the best known reward, it replaces this reward. In a world with noise, a reward
-        is minus the mean ticks of 1,000 executions, whose noise differs from the noise by which
-        runs are judged.
+        Each value is a :class:`.BestKnown`: the reward with its bound and its source. Tasks without
+        a best known reward are left out (:func:`.best_known`). If the corrective process with its
+        best hands gets a higher reward than the best known reward, the reward of the corrective
+        process is used instead. In a world with noise, a reward is minus the mean ticks of 1,000
+        executions, whose noise differs from the noise by which runs are judged.
         """
         fresh = self._executed_afresh if self.is_noisy else None
         runs, tasks = self.stored, self.tasks.values()
@@ -346,8 +346,9 @@ class Study:
     def _reference_values(self, task: str, answers: Sequence[Sequence[Movement]]) -> list[float]:
         """Return minus the mean ticks of 1,000 executions of each answer.
 
-        An answer is a sequence of movements. The noise is that of references (:func:`.judge`,
-        :func:`.reference_seed`).
+        An answer is a sequence of movements. The executions use the noise seed of references
+        (:func:`.reference_seed`), which differs from the seeds by which runs are judged
+        (:func:`.judge`).
         """
         seeds = [reference_seed(self.plan[0].seed, task)] * len(answers)
         means, _ = judge(self.tasks[task], answers, self.models[task], seeds, FRESH_EXECUTIONS)
@@ -378,9 +379,9 @@ class Study:
         """A dict that maps each task's name to the reward of the corrective process.
 
         The corrective process acts alone with its best hands. Shares of the possible gain, and
-        reward targets, start from this reward. It is in negative ticks. For a task with more than
-        4,096 hand sequences, it is the reward with the task's initial hands. It is NaN if the
-        corrective process does not complete the task with any of these hands.
+        reward targets, are measured from this reward, which is in negative ticks. For a task with
+        more than 4,096 hand sequences, it is the reward with the task's initial hands. It is NaN if
+        the corrective process does not complete the task with any of these hands.
 
         In a world with noise, the corrective process is executed with the same noise by which the
         runs are judged. As this noise depends on the number of the run, the reward is a mean over
@@ -431,22 +432,22 @@ class Study:
           ``mean_ticks`` (:func:`.run_values`);
         - ``motor_noise``, ``norm`` and ``base_weight``: constants of the run's world;
         - ``label``: label of the method: its id with its setting;
-        - ``ranked_as``: name of the row of the ranking in which the run counts. It differs from
+        - ``ranked_as``: name of the row of the ranking to which the run belongs. It differs from
           ``label`` if two conditions of the learner, for one arm and for two arms, share a row;
         - ``budget``: the number of trials that was asked for; missing for a method that does not
           use the reward of each trial;
         - ``note``: warnings about the method (:attr:`marks`); empty if there are none;
-        - ``family`` and ``split`` of the task, its number of ``goals``, and its number of ``arms``
-          (1 or 2);
+        - ``family`` and ``split`` of the task, the number of ``goals`` of the task, and ``arms``,
+          the number of arms of which the task uses the hands (1 or 2);
         - ``best_known``: best known reward of the task in the run's world; missing if no reward is
-          known, and for a run of a search with another base than the task's;
+          known, and for a run of a search that locks other base coordinates than the task does;
         - ``corrective_best``: as in :attr:`corrective_best`. In a world with noise, it is the value
           of the corrective process executed with the same noise by which the run is judged;
-        - ``gap``: the gap of the value to the best known reward, as a share of it
-          (:func:`.relative_gaps`). In noise it can be negative by chance;
-        - a column for each parameter of methods, except parameters with the name of another
-          column. Column ``trials`` is the number of trials that the run made, and column ``hands``
-          has the hands of the solution.
+        - ``gap``: the difference between the best known reward and the value, divided by the size
+          of the best known reward (:func:`.relative_gaps`). In noise it can be negative by chance;
+        - a column for each parameter of methods, except parameters with the name of another column.
+          Therefore column ``trials`` is the number of trials that the run made, and column
+          ``hands`` contains the hands of the solution.
         """
         if len(self.worlds) > 1:
             parts = [study.runs for study in self.worlds.values()]
@@ -491,9 +492,9 @@ class Study:
     def methods(self) -> pd.DataFrame:
         """A row for each setting of each method, in the order of lists and figures.
 
-        The frame is indexed by label. Two conditions of the learner that share a row of the
-        ranking, such as EC1 on tasks for one arm and EC4 on tasks for two arms, have a further row,
-        which copies most columns of the second condition. Columns:
+        The frame is indexed by label. If two conditions of the learner share a row of the ranking,
+        such as EC1 on tasks for one arm and EC4 on tasks for two arms, there is a further row for
+        both together, which copies most columns of the second condition. Columns:
 
         - ``method_id``: id of the method without a setting;
         - ``condition``: id of the learner's exploration condition, such as ``EC4`` (informed
@@ -522,8 +523,8 @@ class Study:
     def cells(self) -> dict[CellKey, pd.DataFrame]:
         """A dict that maps each cell to its runs, including failed runs.
 
-        Cells are in the order of the plan. A key has the name of the task and the label of the
-        method. Raises CoarticError for a study of several worlds.
+        Cells are in the order of the plan. A key is a pair: the name of the task, and the label of
+        the method. Raises CoarticError for a study of several worlds.
         """
         check_study(self)
         runs = self.runs.copy(deep=False)
@@ -591,8 +592,9 @@ class Study:
         Yields
         ------
         (str, ndarray)
-            Id of the run, and rewards of its trials in negative ticks, shape ``(trials,)``. A
-            reward is NaN if the trial failed, or if its reward is not stored.
+            Id of the run, and rewards of the trials of the run in negative ticks, shape
+            ``(trials,)``. An entry is NaN if the trial failed, or if the reward of the trial is not
+            stored.
         """
         ids = {*self.stored.run_id}
         with open_results(self.folder) as store:
@@ -682,7 +684,7 @@ class Study:
         Raises
         ------
         CoarticError
-            The folder has no runs of the method on the task, or they cannot be executed again.
+            The folder has no runs of the method on the task, or the runs cannot be executed again.
         """
         return self.executed(task, method, replay=replay).configurations
 
@@ -709,9 +711,9 @@ class Study:
         Returns
         -------
         Series
-            Values in the unit of the signature, with the index of :attr:`runs`. A value is NaN for
-            a run without the signature, for a failed run, and for all but the first 500 solved runs
-            of a method on a task.
+            Values in the unit of the signature, with the index of :attr:`runs`. A value is NaN if
+            the signature is not defined for the run, for a failed run, and for all solved runs of a
+            method on a task after the first 500.
 
         Raises
         ------
@@ -770,7 +772,7 @@ class Study:
 
         These are all tasks of the study. If more than eight of them are instances of families
         (random tasks), all instances are left out. A changed instance, such as
-        ``two-armed/v1/i017.radius-0.2``, counts as an instance.
+        ``two-armed/v1/i017.radius-0.2``, is treated as an instance.
         """
         drawn = {name for name in self.tasks if address_of(name.partition(".")[0]) is not None}
         left_out = drawn if len(drawn) > 8 else ()

@@ -3,8 +3,8 @@
 :data:`TABLES` maps the id of each table to the table. The decorator :func:`table` makes a table
 from a caption, a string that describes its columns, and a function that yields its rows:
 
-- The string has a line for each column, with the name of the column, its heading, its number of
-  decimals, and ``tex`` if LaTeX includes the column.
+- The string contains a line for each column, with the name of the column, its heading, its number
+  of decimals, and ``tex`` if LaTeX includes the column.
 - The function yields a pair for each row: the name of the row, and a dict that maps names of
   columns to values.
 - At least one row must have an entry (which may be NaN) for each column, and each entry of a row
@@ -176,9 +176,9 @@ class Table:
         """Return the table of a study as a frame, indexed by row names.
 
         The ends of intervals are in columns whose names end in ``_low`` and ``_high``, and standard
-        deviations in columns whose names end in ``_sd``. Column ``note`` has the warnings about
-        methods, which mark their titles with ‡ (:attr:`.Study.marks`). The frame is cached: do not
-        change it. Raises CoarticError for a study of several worlds.
+        deviations in columns whose names end in ``_sd``. Column ``note`` contains the warnings
+        about methods (:attr:`.Study.marks`); the title of a method with a warning is marked with ‡.
+        The frame is cached: do not change it. Raises CoarticError for a study of several worlds.
         """
         check_study(study)
         return _frame_of(self, study)
@@ -241,8 +241,8 @@ def _frame_of(table: Table, study: Study) -> pd.DataFrame:
 def _with_marks(rows: pd.DataFrame, study: Study) -> pd.DataFrame:
     """Add the warnings about methods (:attr:`.Study.marks`) to column ``note`` of a table.
 
-    If the study has warnings and the table has methods but no column ``note``, this column is
-    inserted before ``run_ids``. The result is returned.
+    If the study has warnings, and the table has rows of methods but no column ``note``, such a
+    column is inserted before column ``run_ids``. The changed table is returned.
     """
     columns = [name for name in ("method", "against") if name in rows]
     if not (study.marks and columns):
@@ -274,8 +274,8 @@ def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
 def caption_of(table: Table, study: Study) -> str:
     """Return the caption of a table, filled in for a study.
 
-    It has the number of ranked tasks, the name of the best known rewards, and the world if it is
-    not the paper's.
+    The caption contains the number of ranked tasks, the name of the best known rewards, and the
+    name of the world if it is not the paper's world.
     """
     caption = table.caption.replace("{tasks}", pluralize(len(ranked_tasks(study)), "task"))
     caption = caption.replace("{reference}", reference(study, study.optima))
@@ -286,8 +286,8 @@ def csv_of_worlds(frames: Mapping[str, pd.DataFrame]) -> str:
     """Return a table of all worlds of a folder as one CSV file.
 
     ``frames`` maps each world (:attr:`.Study.worlds`) to the table in this world. The first column
-    of the file, ``world``, has the world of the row. It is left out if the folder has only the
-    paper's world.
+    of the file, ``world``, names the world of each row. This column is left out if the folder
+    contains only the paper's world.
     """
     if [*frames] == [""]:
         return csv_of(frames[""])
@@ -339,7 +339,7 @@ def shown_columns(
     frame : DataFrame
         Rows of the table of this study.
     in_latex : bool
-        True to return only the columns that LaTeX has.
+        True to return only the columns that LaTeX includes (attribute ``in_latex``).
     """
     titles = {
         **{str(task.family): str(task.family).split("/")[0] for task in study.tasks.values()},
@@ -443,8 +443,10 @@ def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
 def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[str] = ()) -> str:
     """Return a table as LaTeX with booktabs and longtable, made by pandas' Styler.
 
-    The table has the columns that are marked with ``tex``. The sentences in ``notes`` follow below
-    the table. If the table or a note has a dagger, a sentence that explains it is added.
+    The table contains the columns whose attribute ``in_latex`` is True (marked with ``tex`` in the
+    definition of the table), except columns without a value. The sentences in ``notes`` follow
+    below the table. If a dagger occurs in the table or in a note, a sentence that explains the
+    dagger is added.
     """
     columns = shown_columns(table, study, frame, in_latex=True)
     cells = pd.DataFrame({name: map(latex, column.texts) for name, column in columns.items()})
@@ -507,7 +509,7 @@ fraction of the targets that must be reached."""
 def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
     """Count the individual tasks on which each method is better or worse than the learner.
 
-    The learner is EC1 on a task for one arm, and EC4 on a task for two arms. A task counts if
+    The learner is EC1 on a task for one arm, and EC4 on a task for two arms. A task is counted if
 
     - both methods solved all their runs on the task, and
     - the means of their values differ significantly. The p-values are Holm-adjusted over the tasks
@@ -555,11 +557,11 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
 def _mean_gap_after(study: Study, trials: int) -> pd.Series:
     """Return the mean gap of each method after a number of trials, over tasks.
 
-    The gap of a run is the gap of its best trial among the first ``trials`` trials. A run whose
-    rewards of trials are not stored has its final gap. The mean is over runs and then over tasks.
-    It is NaN if a run of the method had no solution after so many trials. All means are NaN in a
-    world with noise, where the best trial so far is partly luck. The result is indexed by the
-    labels of the rows of the ranking.
+    The gap of a run is the gap of its best trial among the first ``trials`` trials. For a run whose
+    rewards of trials are not stored, the final gap is used. The mean is over runs and then over
+    tasks. The mean is NaN if a run of the method had not found a solution by then. All means are
+    NaN in a world with noise, where the best trial so far is partly luck. The result is indexed by
+    the labels of the rows of the ranking.
     """
     runs = compared_runs(study)
     if study.is_noisy:
@@ -642,7 +644,7 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
 def list_ranking(study: Study) -> Rows:
     """Yield a row for each ranked method (:func:`.standings`), the smallest gap first.
 
-    A row has the mean gap and the mean share of the possible gain over tasks, the gap on each
+    A row contains the mean gap and the mean share of the possible gain over tasks, the gap on each
     individual task, the mean gap after 1,000 trials, and the mean costs of a run. Gaps and shares
     are fractions.
     """
@@ -669,8 +671,9 @@ def list_ranking(study: Study) -> Rows:
 def list_not_ranked(study: Study) -> Rows:
     """Yield a row for each method that is not ranked (:func:`.standings`), with the reason.
 
-    The row also has the gap on each individual task. If the method solved all runs, but with
-    another number of trials than the ranked methods, the row has its mean gap over tasks, too.
+    The row also contains the gap on each individual task. If the method solved all runs, but was
+    asked for another number of trials than the ranked methods, the row also contains the mean gap
+    of the method over tasks.
     """
     return _standing_rows(study, ranked=False)
 
@@ -697,12 +700,12 @@ def list_differences(study: Study) -> Rows:
 
     - :attr:`.Study.against`, if it is not empty;
     - otherwise, if the study varies parameters, the first setting of the ranking;
-    - otherwise each method from a file in turn. It is then compared only with the built-in methods
-      that use the reward in the same way.
+    - otherwise each method from a file in turn. A method from a file is compared only with the
+      built-in methods that use the reward in the same way.
 
     A method is left out if
 
-    - on one of these tasks, it has no runs or a failed run;
+    - on one of the tasks of the comparison, the method has no runs or a failed run;
     - it was asked for another number of trials than the reference method;
     - it is a setting or an ablation of a method that ran (column ``parent`` of
       :attr:`.Study.methods`).
@@ -749,8 +752,9 @@ that is the exact gap of a deterministic method."""
 def _gaps_by_task(study: Study, method: str, tasks: Sequence[str]) -> _Gaps:
     """Return the gaps of a method on each task, in the order of ``tasks``.
 
-    ``method`` is its label. It must have runs on all these tasks. The gap of a deterministic method
-    is exact, a float.
+    ``method`` is the label of the method, which must have runs on all tasks in ``tasks``. For each
+    task, the result contains an array with the gaps of the runs or, for a deterministic method, a
+    float: the exact gap.
     """
     by_task = runs_on(study, method, tasks).groupby("task").gap
     gaps = [by_task.get_group(task).to_numpy(np.float64) for task in tasks]
@@ -760,7 +764,8 @@ def _gaps_by_task(study: Study, method: str, tasks: Sequence[str]) -> _Gaps:
 def _mean_of_gaps(gaps: _Gaps) -> Estimate:
     """Return the mean gap over tasks, with its interval for other runs.
 
-    It is the mean over tasks of the mean over runs. There is no interval if all gaps are exact.
+    The result is the mean over tasks of the mean over runs. There is no interval if all gaps are
+    exact.
     """
     return _sum_of_gaps([(1 / len(gaps), of) for of in gaps])
 
@@ -807,15 +812,15 @@ def values_of_parameters(study: Study) -> dict[str, list[ValueOfParameter]]:
     """Return the values of each varied parameter that can be compared, with their settings.
 
     The values of a parameter are compared at equal values of all other parameters. Therefore a
-    combination of values of the other parameters counts only if the settings with this combination
+    combination of values of the other parameters is used only if the settings with this combination
     are ranked for all values of the parameter that occur among ranked settings.
 
     Returns
     -------
     dict of str to list of ValueOfParameter
-        Maps the name of each parameter to its values. The list is empty if no combination counts,
-        or if only one value is ranked. The dict is empty if the study does not vary parameters, or
-        if fewer than two settings are ranked. It is cached: do not change it.
+        Maps the name of each parameter to its values. A list is empty if no combination can be
+        used, or if only one value is ranked. The dict is empty if the study does not vary
+        parameters, or if fewer than two settings are ranked. The dict is cached: do not change it.
     """
     ranked = standings(study).query("why == ''").index
     varied = study.varied[study.varied.index.isin(ranked)]
@@ -846,10 +851,10 @@ def values_of_parameters(study: Study) -> dict[str, list[ValueOfParameter]]:
 def gaps_of_settings(study: Study, labels: Sequence[str]) -> pd.Series:
     """Return the mean gap, over settings, of runs with the same task and number.
 
-    Runs of different settings with the same number have the same seed. Therefore their mean is the
-    unit of resampling. ``labels`` are the labels of the settings. The result is a Series of
-    fractions, indexed by task and number of the run. It has only numbers of which each setting has
-    a run.
+    Runs of different settings with the same number have the same seed. Therefore the mean of their
+    gaps is the unit of resampling. ``labels`` are the labels of the settings. The result is a
+    Series of fractions, indexed by task and number of the run. A task and a number are left out if
+    a setting has no run of this number on the task.
     """
     runs = compared_runs(study)
     runs = runs[runs.label.isin(labels)]
@@ -877,13 +882,13 @@ def list_parameters(study: Study) -> Rows:
 
     - ``gap``: mean gap over the settings with this value (:func:`values_of_parameters`) and over
       tasks, a fraction, with its interval for other runs on the same tasks;
-    - ``at_best``: gap of the setting with this value whose other parameters have the values of the
-      best setting;
+    - ``at_best``: gap of the setting that has this value, and the values of the best setting in all
+      other parameters;
     - ``difference`` and ``p_holm``: difference from the value with the smallest gap, and its
       p-value, as in :func:`list_differences`. The p-values are Holm-adjusted over the values of the
       parameter;
     - ``default``: what the default value is called; empty for any other value;
-    - ``equal``: True if the parameter has no effect: each run has the same reward at all values.
+    - ``equal``: True if the parameter has no effect: each run gets the same score at all values.
     """
     tasks, ranks, methods = ranked_tasks(study), standings(study), study.methods
     for parameter, values in values_of_parameters(study).items():
@@ -919,10 +924,11 @@ def list_parameters(study: Study) -> Rows:
 
 
 def _are_equal(study: Study, settings: Sequence[Sequence[str]]) -> bool:
-    """Return True if each run has the same value at all values of a parameter.
+    """Return True if a parameter has no effect: all its values give the same results.
 
-    ``settings`` has a list of labels for each value of the parameter. Settings at the same position
-    in two lists differ only in this parameter; their runs are compared.
+    ``settings`` contains a list of labels of settings for each value of the parameter. Settings at
+    the same position of two lists differ only in this parameter. Runs of such settings with the
+    same task and number are compared by their scores (column ``value`` of :attr:`.Study.runs`).
     """
     by_run = compared_runs(study).set_index(["task", "run"])
     for labels in zip(*settings, strict=True):
@@ -963,10 +969,10 @@ def _are_equal(study: Study, settings: Sequence[Sequence[str]]) -> bool:
 def list_contexts(study: Study) -> Rows:
     """Yield a row for each method, pair of tasks, shared goal, and hand.
 
-    A row has the posture difference between the two tasks, with a verdict, and the lean
+    A row contains the posture difference between the two tasks, with a verdict, and the lean
     (:func:`.lean`); both are also computed from the base alone and from the joints alone. For
-    comparison, it has the posture difference of random search. The p-values are Holm-adjusted over
-    the rows of the method.
+    comparison, the row also contains the posture difference of random search. The p-values are
+    Holm-adjusted over the rows of the method.
     """
     for label in study.methods.index:
         contexts = list(shared_goals(study, label))
@@ -1002,7 +1008,8 @@ def list_contexts(study: Study) -> Rows:
 def _columns_by_part(shared: TwoContexts) -> Row:
     """Return the columns of a comparison for the base and the joints alone.
 
-    They are the posture difference, the lean, and the distance between the mean next postures.
+    The columns are the posture difference, the lean, and the distance between the mean next
+    postures.
     """
     row: Row = {}
     for part in ("base", "joints"):
@@ -1039,19 +1046,19 @@ def _columns_of(signature: Signature) -> str:
     + "".join(map(_columns_of, SIGNATURES.values())),
 )
 def list_signatures(study: Study) -> Rows:
-    """Yield the signatures of each method, except searches, on each individual task.
+    """Yield the mean signatures of each method on each individual task.
 
-    A method has on each task
+    Searches for the optimum are left out. For each other method on each task, there are
 
-    - a row for each hand sequence that at least a tenth of its solved runs have
+    - a row for each hand sequence that occurs in at least a tenth of the method's solved runs
       (:func:`.with_control`);
-    - a row for the choice of hands itself, whose ``hands`` are empty, if the task is for two arms
-      and has at least two goals.
+    - a row for the choice of hands itself, with an empty entry in column ``hands``, if the task is
+      for two arms and has at least two goals.
 
-    Signatures are means over runs. For a method that selects its solution from trials, a row also
-    has the signatures of random search, and the p-value of the one-sided exchange test, which is
-    not adjusted for multiple tests. Column ``control_idle_arm`` says how random search treats the
-    idle arm: ``with noise``, or ``still`` as under EC3.
+    Signatures are means over runs. If a method selects its solution from trials
+    (:func:`.selects`), its rows also contain the signatures of random search and the p-value of the
+    one-sided exchange test, which is not adjusted for multiple tests. Column ``control_idle_arm``
+    says how random search treats the idle arm: ``with noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     # The row of the choice of hands is above those of hand sequences.
@@ -1148,11 +1155,11 @@ def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
 def list_saved(study: Study) -> Rows:
     """Yield how many ticks more than the corrective process each method takes for each goal.
 
-    There is a row for each individual task and each method, except searches, that solved a run.
-    Columns ``by_goal_1``, ``by_goal_2`` and so on, and their ``sum``, are means over runs: ticks of
-    the run minus the ticks of the corrective process alone with the same hand sequence. A run is
-    left out if the corrective process does not complete the task with the hands of the run. A row
-    without runs is left out.
+    There is a row for each individual task and each method that solved a run of the task; searches
+    for the optimum are left out. Columns ``by_goal_1``, ``by_goal_2`` and so on, and their ``sum``,
+    are means over runs: ticks of the run minus the ticks of the corrective process alone with the
+    same hand sequence. A run is left out if the corrective process does not complete the task with
+    the hands of the run. A row without runs is left out.
     """
     for (task, label), runs in study.cells.items():
         if (
@@ -1187,12 +1194,12 @@ def list_saved(study: Study) -> Rows:
 def list_runtimes(study: Study) -> Rows:
     """Yield the cost at which each method reaches a quarter and half of the targets.
 
-    The columns are those of :data:`COSTS`, and the fraction of targets that are ``reached`` at any
-    cost. For a method that uses the reward of each trial, each column ``half on TASK`` is the
-    median, over runs on this task, of the number of trials to the target halfway to the best known
-    reward. It is infinite if more than half of the runs do not reach this target. Methods without a
-    solution, or with an unknown number of trials, are left out. In a world with noise there are no
-    rows.
+    The columns are those of :data:`COSTS`, and ``reached``, the fraction of targets that the method
+    reaches at any cost. For a method that uses the reward of each trial, each column ``half on
+    TASK`` is the median, over runs on this task, of the number of trials to the target halfway to
+    the best known reward. The median is infinite if more than half of the runs do not reach this
+    target. Methods without a solution, or with an unknown number of trials, are left out. In a
+    world with noise there are no rows.
     """
     for method, runs in runs_with_targets(study).items():
         times = {spend: times_on_tasks(study, runs, spend) for spend in SPENDS}
@@ -1226,11 +1233,11 @@ def list_runtimes(study: Study) -> Rows:
 def list_learning(study: Study) -> Rows:
     """Yield the mean best reward of each method after 100, 1,000 and 10,000 trials.
 
-    There is a row for each individual task and each method, except searches, if all runs of the
-    method on the task have a solution, stored rewards of their trials, and at least 100 trials.
-    Rewards are means over runs of the best reward so far, in negative ticks, after each number of
-    trials in :data:`BUDGETS`. A reward is NaN if a run made fewer trials, or had no solution after
-    so many trials. In a world with noise there are no rows.
+    There is a row for each individual task and each method, provided that each run of the method on
+    the task is solved, made at least 100 trials, and has stored rewards. Searches for the optimum
+    are left out. Rewards are means over runs of the best reward so far, in negative ticks, after
+    each number of trials in :data:`BUDGETS`. A mean is NaN if a run made fewer trials than that, or
+    had not found a solution by then. In a world with noise there are no rows.
     """
     if study.is_noisy:  # the best trial so far is partly luck
         return
@@ -1252,8 +1259,8 @@ def list_learning(study: Study) -> Rows:
 def _instances(study: Study) -> dict[str, list[str]]:
     """Return a dict that maps each family to the names of its instances.
 
-    Only instances with a best known reward count. Instances are random tasks of a family. The dict
-    is cached: do not change it.
+    Instances are random tasks of a family. Instances without a best known reward are left out. The
+    dict is cached: do not change it.
     """
     families: dict[str, list[str]] = {}
     for name in study.optima:
@@ -1266,9 +1273,9 @@ def _instances(study: Study) -> dict[str, list[str]]:
 def instance_runs(study: Study) -> pd.DataFrame:
     """Return each method's runs on the instances that it solved in all runs.
 
-    Only instances with a best known reward count. Runs are sorted by family and instance, as in
-    :func:`_instances`. Column ``method`` has the label of the method's row in the ranking. The
-    frame is cached: do not change it.
+    Instances without a best known reward are left out. Runs are sorted by family and instance, as
+    in :func:`_instances`. Column ``method`` contains the label of the row of the ranking to which
+    the method belongs. The frame is cached: do not change it.
     """
     runs = compared_runs(study)
     names = [*itertools.chain.from_iterable(_instances(study).values())]
@@ -1318,14 +1325,14 @@ def list_family_gaps(study: Study) -> Rows:
     """Yield each method's mean gap on instances, by family and over families.
 
     Column ``gap`` is the mean over the families with two arms, and each column ``in FAMILY`` is the
-    mean in this family. They are fractions. Intervals are for other tasks of the families. If a
-    method did not solve all runs on all instances of a family, its gap in this family is NaN. If
-    this family has two arms, ``gap`` is NaN, too.
+    mean in this family; both are fractions. Intervals are for other tasks of the families. If a
+    method did not solve all runs on all instances of a family, column ``in FAMILY`` is NaN for this
+    family. If the robots of this family have two arms, ``gap`` is NaN, too.
 
     Column ``instances`` is the number of instances on which all runs of the method are solved, and
-    ``missing`` is the number of the other instances. Both count instances of families with two
-    arms, or, for a method that ran only on families with one arm, instances of the families on
-    which it ran.
+    column ``missing`` is the number of all other instances. Both are numbers of instances of
+    families with two arms. For a method that ran only on families with one arm, they are numbers of
+    instances of the families on which the method ran.
     """
     solved_runs, rows, families = instance_runs(study), list[tuple[str, Row]](), _instances(study)
     two_armed = {family for family in families if len(study.tasks[families[family][0]].hands) > 1}
@@ -1410,9 +1417,9 @@ def list_methods(study: Study) -> Rows:
     """Yield the rewards, hands and median costs of each method on each individual task.
 
     Rewards are negative ticks; in a world with noise they are minus the mean ticks of a run. Within
-    a task, searches for the optimum come first, and the other methods follow. Both are in
-    descending order of the mean reward. Column ``median_run`` has the first characters of the id of
-    the run whose value is nearest to the median; it is None if no run is solved.
+    a task, searches for the optimum come first, and the other methods follow. Both groups are in
+    descending order of the mean reward. Column ``median_run`` contains the first characters of the
+    id of the run whose score is nearest to the median; the entry is None if no run is solved.
     """
     places, rows = {task: place for place, task in enumerate(study.individual_tasks)}, []
     for (task, label), runs in study.cells.items():
@@ -1451,8 +1458,8 @@ def list_methods(study: Study) -> Rows:
 def list_failed(study: Study) -> Rows:
     """Yield the number of failed runs of each method and task, with reasons.
 
-    There is a row for each method and task with at least one failed run. It has the three most
-    frequent reasons.
+    There is a row for each method and task with at least one failed run. The row contains the three
+    most frequent reasons.
     """
     for (task, label), runs in study.cells.items():
         if len(solved(runs)) < len(runs):

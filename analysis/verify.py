@@ -90,8 +90,9 @@ def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
 def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
     """Return x and y of a hand (length units) for n configurations, shape ``(n,)`` each.
 
-    ``q``, shape ``(dof, n)``, has a configuration in each column. ``arm`` has the slice of the
-    arm's joints, the lengths of its links, and the position of its shoulder on the base.
+    ``q``, shape ``(dof, n)``, contains a configuration in each column. ``arm`` contains the slice
+    of the joints of the arm, the lengths of the links, and the position of the shoulder on the
+    base.
     """
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
@@ -105,8 +106,9 @@ def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
 def stored_task(content: str) -> Any:
     """Return the task of a cell, read from the cell's stored JSON.
 
-    It has attributes that a task file lacks: constants of the motion model (``model``), the start
-    (``q0``), ``locked`` coordinates, ``arms``, and ``digest`` (hash) and ``labels`` of the cell.
+    The returned object has attributes that a task file lacks: constants of the motion model
+    (``model``), the start (``q0``), ``locked`` coordinates, ``arms``, and ``digest`` (hash) and
+    ``labels`` of the cell.
     """
     plain = json.loads(content)
     cell = json.loads(content, object_hook=lambda values: SimpleNamespace(**values))
@@ -139,8 +141,8 @@ def scaled(changes: Floats, model: Any) -> Floats:
 def straight_path_points(q: Floats, target: Floats, model: Any) -> Floats:
     """Return the points of a straight movement from ``q`` to a target, shape ``(dof, points)``.
 
-    They are spaced by ``model.step`` in joint space; the last step can be shorter. A coordinate
-    whose entry in the target is NaN does not move.
+    The points are spaced by ``model.step`` in joint space; the last step can be shorter. A
+    coordinate whose entry in the target is NaN does not move.
     """
     target = np.where(np.isnan(target), q, target)
     difference = target - q
@@ -156,8 +158,9 @@ def straight_path_points(q: Floats, target: Floats, model: Any) -> Floats:
 def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
     """Return the points of a path from ``q`` through waypoints, shape ``(dof, points)``.
 
-    ``waypoints`` has a row for each waypoint, shape ``(waypoints, dof)``. The points are spaced by
-    ``model.step`` along the path, beginning at ``q``; the last point is the end of the path.
+    ``waypoints`` contains a row for each waypoint, shape ``(waypoints, dof)``. The points are
+    spaced by ``model.step`` along the path, beginning at ``q``; the last point is the end of the
+    path.
     """
     corners = np.array([q, *waypoints])
     sizes = scaled(np.diff(corners, axis=0), model)
@@ -175,8 +178,8 @@ def make(
 ) -> tuple[Floats, int, bool]:
     """Make a movement from ``q``, and return its end, its ticks, and whether it hits.
 
-    ``corners``, shape ``(rows, dof)``, has the target as its only row, or a row for each waypoint
-    of a path. ``goal`` is the number of the goal, from 1.
+    ``corners``, shape ``(rows, dof)``, consists of the target as the only row or, for a path, of a
+    row for each waypoint. ``goal`` is the number of the goal, from 1.
     """
     model, is_path = task.model, kind == "path"
     points = path(q, corners, model) if is_path else straight_path_points(q, corners[-1], model)

@@ -111,7 +111,7 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
     ----------
     row : mapping
         A row of a table, such as a row of :func:`coartic.analysis.means`. If ``column`` is
-        ``"gap"``, it must have the numbers ``gap``, ``gap_low`` and ``gap_high``.
+        ``"gap"``, the row must contain the numbers ``gap``, ``gap_low`` and ``gap_high``.
     column : str
         Name of the column with the number.
     digits : int
@@ -124,8 +124,8 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
     Returns
     -------
     str
-        A string such as ``7.8 [7.3, 8.1]``. It has only the number if an end is NaN, or if both
-        ends are equal.
+        A string such as ``7.8 [7.3, 8.1]``. The interval is left out if one of its ends is NaN, or
+        if both ends are equal.
 
     Raises
     ------
@@ -217,8 +217,9 @@ def capital(text: str) -> str:
 def slugs(names: Iterable[str]) -> dict[str, str]:
     """Return a dict that maps each name to a unique slug for file names.
 
-    A slug has only small letters, digits and dashes, and at most 80 characters before a number. If
-    two names would have the same slug, such as ``a-b``, the second gets a number: ``a-b-2``.
+    A slug consists of small letters, digits and dashes, and has at most 80 characters before a
+    number. If two names would have the same slug, such as ``a-b``, the second gets a number:
+    ``a-b-2``.
     """
     slug_of: dict[str, str] = {}
     for name in names:

@@ -99,7 +99,7 @@ def solve_by_bandit(
     """Try each hand sequence once, then share the other trials between the sequences by UCB1.
 
     1. For each hand sequence, ``make_search`` makes a search, which makes one trial in which only
-       the corrective process acts. A sequence whose trial fails gets no further trials.
+       the corrective process acts. If this trial fails, the hand sequence gets no further trials.
     2. Until no trial is left, UCB1 chooses the search that makes the next generation
        (:func:`spend_trials`). If all trials of step 1 have failed, this step is left out.
 
@@ -126,8 +126,8 @@ def solve_by_bandit(
     -------
     Result
         The movements of the best trial. With motor noise, the movements to the recommended mean
-        (:func:`recommend`). The details have ``best_trial``, the number of the best trial from 0,
-        and ``trials``, a dict that maps each hand sequence to its number of trials.
+        (:func:`recommend`). The details contain ``best_trial``, the number of the best trial from
+        0, and ``trials``, a dict that maps each hand sequence to its number of trials.
 
     Raises
     ------
@@ -159,8 +159,8 @@ def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: fl
 
     Here R is the best reward of the search so far, n is the number of its generations, N is the
     number of generations of all searches, and c is ``exploration`` times the range of the first
-    rewards of the searches (at least 1 tick). The first trial of a search counts as a generation.
-    Searches whose first trial failed do not take part.
+    rewards of the searches (at least 1 tick). The first trial of a search is counted as a
+    generation. Searches whose first trial failed do not take part.
 
     Parameters
     ----------
@@ -188,8 +188,8 @@ def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: fl
 def recommend(searches: Iterable[Search], attempts: Attempts) -> tuple[Movement, ...]:
     """Return movements to the recommended targets with the lowest cost (:attr:`Search.answer`).
 
-    If no search has a complete generation, the targets are those of the search whose hand sequence
-    is that of the best trial.
+    If no search has made a complete generation, the search with the hand sequence of the best trial
+    recommends the targets.
     """
     best = min(
         searches, key=lambda each: (each.answer[0], each.hand_sequence != attempts.hand_sequence)

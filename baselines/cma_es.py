@@ -21,11 +21,12 @@ last: the hand with the higher value, or a random hand with probability ε. When
 for the first time, the method makes one trial with only the corrective process. If that trial
 succeeds, each later choice of the sequence makes one generation of the strategy of this sequence.
 
-With motor noise the best trial was partly lucky, so the solution has the mean of a strategy as its
-targets. The candidates are the last means of all restarts of the strategies of all hand sequences.
-The solution is the candidate whose last complete generation has the lowest mean cost. In this mean
-cost a failed trial counts as twice the ticks that the corrective process takes with this hand
-sequence, or as 1 tick more than the worst completed trial of the generation, if that is larger.
+With motor noise the reward of the best trial is partly luck, so the targets of the solution are the
+mean of a strategy. The candidates are the last means of all restarts of the strategies of all hand
+sequences. The solution is the candidate whose last complete generation has the lowest mean cost. In
+this mean cost, the cost of a failed trial is the larger of two numbers: twice the ticks that the
+corrective process takes with this hand sequence, and 1 tick more than the worst completed trial of
+the generation.
 
 Tuning, with three or four runs for each value:
 

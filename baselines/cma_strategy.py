@@ -55,7 +55,8 @@ class EvolutionStrategy:
     mean : ndarray, shape (dim,)
         Mean of the first generation.
     sigma : float
-        Standard deviation of each coordinate in the first generation, to within 0.01 %.
+        Standard deviation of each coordinate in the first generation. (The strategy begins with a
+        value that differs from ``sigma`` by less than 0.01 %.)
     size : int
         Number λ of points in a generation.
     rng : numpy.random.Generator

@@ -125,10 +125,10 @@ class Controller(ABC):
         Returns
         -------
         Solution
-            Solution of the cascade. The unit of its changes is ``length``, the largest joint-space
-            length of a control step.
+            Solution of the cascade. Its changes are multiples of ``self.length``, the largest
+            joint-space length of a control step.
         ndarray, shape (joints,)
-            Preferred changes of the joints, in the same unit.
+            Preferred changes of the joints, as multiples of ``self.length``.
         object
             Memory after the step.
         """
@@ -265,11 +265,13 @@ class Control(Method):
         with the fewest ticks is extended by the movement to the next goal, until the prefix with
         the fewest ticks is a complete sequence. Ties are broken by the smaller number of changes of
         hand, then by the order of the sequences. Hand sequences with a common prefix share the
-        simulation of their movements, as far as they also agree in the hands of the goals ahead.
+        simulation of their movements, as far as the sequences also agree in the hands of the goals
+        ahead.
 
-        The result has a movement for each goal. The details have the numbers of hand sequences, of
-        sequences in which a hand got stuck, of simulated movements, of quadratic programmes, and of
-        control steps, and in how many control steps each level binds.
+        The result contains a movement for each goal. The details contain the numbers of hand
+        sequences, of sequences in which a hand got stuck, of simulated movements, of quadratic
+        programmes and of control steps, and for each level the number of control steps in which it
+        binds.
 
         Raises MethodError if a hand gets stuck in all sequences, or if the solver fails.
         """

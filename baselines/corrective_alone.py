@@ -26,7 +26,8 @@ class GivenHands(Method):
     def solve(self, session: Session) -> Result:
         """Make one trial with the task's initial hands, and return the movements of the trial.
 
-        Only the corrective process acts in the trial. Raises MethodError if it misses a goal.
+        Only the corrective process acts in the trial. Raises MethodError if the trial misses a
+        goal.
         """
         hands = session.find_initial_hands()
         with session.solving():

@@ -22,7 +22,8 @@ around which it was drawn. After every W trials with the sequence
 - σ is then clipped to the interval from ``floor`` to 0.3.
 
 With motor noise the value of a centre is the reward of a single trial: the trial whose
-configurations became the centre. That trial was partly lucky. The learner has the same bias.
+configurations became the centre. The reward of that trial is partly luck. The same bias exists in
+the learner.
 """
 
 from __future__ import annotations

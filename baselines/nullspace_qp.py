@@ -101,8 +101,8 @@ class NextGoalController(HandController):
         """Find a posture of the next goal, shape ``(dof,)``, and return it as the memory.
 
         The corrective process starts from ``q`` and tries the goals ahead in order. The memory is
-        the posture of the first goal for which the process converges, or ``q`` if it converges for
-        none of them.
+        the posture of the first goal for which the process converges, or ``q`` if the process
+        converges for none of the goals.
         """
         for hand, goal in aims[1:]:
             correction = self.session.correct(q, hand, goal + 1)
@@ -113,8 +113,8 @@ class NextGoalController(HandController):
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
         """Return the change towards the posture that is due in one control step.
 
-        This is the change from ``q`` to the posture ``memory``, divided by the number of control
-        steps to the goal (at least 1). A change with a norm above 1 is scaled down to norm 1.
+        The result is the change from ``q`` to the posture ``memory``, divided by the number of
+        control steps to the goal (at least 1). A change whose norm exceeds 1 is scaled to norm 1.
         Parameters, shapes and units are those of :meth:`HandController.preferred`.
         """
         path = (memory - q)[self.moving] / self.length

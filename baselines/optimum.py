@@ -182,7 +182,7 @@ def with_locks(task: Task, base: str) -> Task:
 
 
 class InModelParameters(Parameters):
-    """Parameters of the search for the optimum in any motion model: its effort."""
+    """Parameters that set the effort of the search for the optimum in any motion model."""
 
     evaluations: Annotated[int, Field(ge=0)] = 4000
     """Number of solutions that CMA-ES tries from each start. The last generation is completed, so
@@ -229,9 +229,10 @@ class InModel(Method):
     def solve(self, session: Session) -> Result:
         """Search from both starts, and return the movements with the fewest mean ticks.
 
-        The details map the name of each start to a dict with its hand sequence (``hands``) and two
-        mean ticks over the noise draws of the final comparison: those of the start itself
-        (``start``), and those of the best solution that was found from it (``end``).
+        The details map the name of each start to a dict with three entries: the hand sequence
+        (``hands``), and the mean ticks of the start itself (``start``) and of the best solution
+        that was found from it (``end``). Both means are over the noise draws of the final
+        comparison.
 
         Raises MethodError if ``optimum/search`` finds no path, and the corrective process completes
         the task with no hand sequence.
@@ -354,7 +355,7 @@ def mean_ticks_in(session: Session, task: Task, start: _Start, worst: int, seed:
     start : _Start
         Hand sequence of all points, and the targets whose entries the points replace.
     worst : int
-        Number of ticks that a failed execution counts as.
+        Number of ticks that is used for a failed execution.
     seed : int
         Number from which the noise seed is derived.
 

@@ -1,7 +1,7 @@
 """Policy gradient: mean and spread of a Gaussian policy follow the gradient of the reward.
 
 The rule is REINFORCE (Williams 1992) for a Gaussian policy. Haith (2025) proposes it as a theory of
-how people improve a movement by practice: after each trial the mean *and* the spread of their
+how people improve a movement by practice: after each trial the mean *and* the spread of a person's
 movements change in the direction that makes better movements more frequent.
 
 Each hand sequence has a Gaussian policy over the targets of all explored joints, with mean m and a
@@ -23,9 +23,9 @@ advantages A of the trials::
   update, b and d move by a tenth of the difference towards the values of the batch, for which
   |R - b| is computed with the old b.
 - Without the bounds on A, a single bad batch can move the policy far away.
-- A failed trial counts as the worst reward of all batches so far, less one tick. Until a trial of a
-  batch has hit every goal, a failed trial counts as minus twice the ticks of the corrective
-  process.
+- The reward of a failed trial is replaced by the worst reward of all batches so far, less one tick.
+  Until a trial of a batch has hit every goal, it is replaced by minus twice the ticks of the
+  corrective process.
 - An incomplete last batch does not change the policy.
 
 With ``spread="fixed"`` ν does not change.
@@ -80,7 +80,7 @@ class PolicyGradientParameters(SequenceParameters):
 
     @property
     def steps(self) -> tuple[int, float, float]:
-        """B, α and β; β is 0 if the spread is fixed."""
+        """The batch size B, and the step sizes α and β; β is 0 if the spread is fixed."""
         batch, step, spread_step = _TUNED[self.spread]
         if self.spread == "learned":
             spread_step = self.spread_step or spread_step
@@ -123,7 +123,8 @@ class Policy(Search):
     def generation(self) -> None:
         """Make the trials of a batch, and update mean and spread by the policy gradient.
 
-        If fewer trials are left than a batch has, only these are made, and nothing is updated.
+        If fewer trials are left than belong to a batch, only the trials that are left are made, and
+        nothing is updated.
         """
         z = self._rng.standard_normal((self._batch, len(self.mean)))
         spread = exp(self.log_spread)

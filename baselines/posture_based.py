@@ -8,10 +8,11 @@ to that posture:
    the corrected postures whose hand is at the goal, the planner retrieves the one with the lowest
    travel cost.
 2. *Instance generation.* Until a deadline, the planner generates random postures near the retrieved
-   one (*diffusion*). They are corrected and evaluated in the same way. The feedforward correction
-   improves their accuracy (Rosenbaum, Loukopoulos, Meulenbroek, Vaughan & Engelbrecht 1995).
+   one (*diffusion*). These postures are corrected and evaluated in the same way as stored postures.
+   The feedforward correction improves the accuracy of the postures (Rosenbaum, Loukopoulos,
+   Meulenbroek, Vaughan & Engelbrecht 1995).
 3. *Simulation.* An internal simulation computes where the movement will end. The planned postures
-   are added to the stored ones.
+   are added to the stored postures.
 
 With a horizon of two goals, the travel cost includes the path from the posture to a posture at the
 next goal. Only the first movement is made; the posture at the next goal is planned again when the
@@ -96,7 +97,7 @@ class PostureBased(Method):
     def solve(self, session: Session) -> Result:
         """Plan the movements to the goals one after the other, and return them.
 
-        The details have the expected ticks of each movement. Raises MethodError if no stored
+        The details contain the expected ticks of each movement. Raises MethodError if no stored
         posture can be corrected so that a hand is at a goal.
         """
         with session.building():
@@ -138,7 +139,7 @@ METHODS: tuple[type[Method], ...] = (OneGoal, TwoGoals)
 class PosturePlanner:
     """Plan the movements of a task from stored postures.
 
-    Attribute ``store`` has the stored postures, shape ``(n, dof)``. Attribute ``q`` is the
+    Attribute ``store`` contains the stored postures, shape ``(n, dof)``. Attribute ``q`` is the
     configuration in which the movements planned so far are expected to end, shape ``(dof,)``. Both
     are in length units (base) and rad (joints).
     """
@@ -174,7 +175,7 @@ class PosturePlanner:
     def plan(self) -> tuple[tuple[Movement, ...], list[int]]:
         """Plan the movements to all goals.
 
-        Call this method once: it changes ``q`` and ``store``.
+        Call this method only once, because it changes ``self.q`` and ``self.store``.
 
         Returns
         -------
@@ -228,11 +229,11 @@ class PosturePlanner:
 
         For each goal and hand, each stored posture is corrected in three steps:
 
-        1. The angles of the hand's arm are copied from the stored posture, all other entries from
-           ``q``.
+        1. The angles of the hand's arm are copied from the stored posture, and all other entries
+           from ``self.q``, the configuration in which the movements planned so far end.
         2. The free base coordinates move by the displacement from the hand to the goal.
-        3. Base and arm are corrected (:meth:`correct`). Postures whose hand is still not at the
-           goal are left out.
+        3. Base and arm are corrected (:meth:`correct`). A posture is left out if its hand is still
+           not at the goal.
 
         Parameters
         ----------
@@ -256,7 +257,7 @@ class PosturePlanner:
         return retrieved
 
     def most_promising(self, hands: HandSequence, layers: list[Array]) -> Array:
-        """Return the retrieved postures with the shortest joint-space path from ``q``.
+        """Return the retrieved postures with the shortest joint-space path from ``self.q``.
 
         On the way to the second of two postures only the base and the arm of the second hand move.
 
@@ -306,8 +307,8 @@ class PosturePlanner:
         -------
         list of tuple
             For each hand sequence a tuple (cost, hand sequence, postures). The postures, shape
-            ``(goals, dof)``, are the cheapest that were found; their cost is the joint-space length
-            of the path from ``q`` through the postures.
+            ``(goals, dof)``, are the cheapest postures that were found. The cost is the joint-space
+            length of the path from ``self.q`` through these postures.
         """
         sequences = [*promising]
         centre = best = np.stack([*promising.values()])
@@ -358,7 +359,7 @@ class PosturePlanner:
         Returns
         -------
         ndarray of bool, shape (...)
-            True for each posture whose hand is now within ``tolerance`` of the goal's centre.
+            True for each posture whose hand is now within ``self.tolerance`` of the goal's centre.
         """
         flat = postures.reshape(-1, postures.shape[-1])
         arm = self.robot.arm(hand)
@@ -404,8 +405,8 @@ def _linearise_far(
     postures : ndarray, shape (N, dof)
         Postures, in length units and rad.
     far : ndarray of int, shape (F,)
-        Indices of the postures to look at. Those in which the hand is farther than ``tolerance``
-        from (x, y) are moved to the beginning, in place.
+        Indices of the postures to look at. Indices of postures in which the hand is farther than
+        ``tolerance`` from (x, y) are moved to the beginning, in place.
     arm : Arm
         Arm of the hand, with n links.
     x, y : float

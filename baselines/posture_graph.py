@@ -63,8 +63,8 @@ def _sample_postures(
         Number of the goal, from 0.
     hand : {"left", "right"}
     starts : ndarray, shape (N, dof)
-        Configurations, in length units and rad. The other arm and locked base coordinates keep
-        their values.
+        Configurations, in length units and rad. The joints of the other arm and locked base
+        coordinates do not change.
     rng : numpy.random.Generator
     spent : Counter
         Counter to which the numbers of evaluations are added.
@@ -106,8 +106,8 @@ class PrefixCosts(NamedTuple):
     """Table of dynamic programming for one prefix of hand sequences.
 
     The state is a pair of last nodes: the node at which the left hand was last used, and the node
-    at which the right hand was last used. For each pair, the table has the cost of the cheapest
-    path through the layers of the prefix that ends in these nodes.
+    at which the right hand was last used. For each pair, the table contains the cost of the
+    cheapest path through the layers of the prefix that ends in these two nodes.
     """
 
     hands: HandSequence
@@ -128,9 +128,9 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
     """Sample the nodes of a posture graph for each goal and hand.
 
     A node is a posture in which the hand is inside the goal's disc. Each sample begins with a
-    random configuration, which is then corrected until the hand is inside the disc. Half of the
-    random configurations are drawn around nodes of the goal before, of either hand, if there are
-    any. The others are drawn around the task's start.
+    random configuration, which is then corrected until the hand is inside the disc. If the goal
+    before has nodes, of either hand, half of the random configurations are drawn around these
+    nodes. All other random configurations are drawn around the task's start.
 
     Parameters
     ----------
@@ -211,10 +211,10 @@ def chains_of(
 def _extend(
     task: Task, layers: Layers, begun: PrefixCosts, base_weight: float
 ) -> Iterator[PrefixCosts]:
-    """Extend a prefix by one goal, with each hand that has nodes there.
+    """Extend a prefix of a hand sequence by one goal, with each hand that has nodes at the goal.
 
-    ``begun`` is the table of the prefix. ``layers`` and ``base_weight`` are as in
-    :func:`chains_of`.
+    ``begun`` contains the costs of the prefix. Yields the costs of each longer prefix, first that
+    with the left hand. ``layers`` and ``base_weight`` are as in :func:`chains_of`.
     """
     hands, nodes, cost, predecessors = begun
     goal = len(hands)
@@ -261,12 +261,14 @@ def cheapest_chains(
     graphs : int
         Smallest number of graphs.
     chains : int
-        Smallest number of chains over all graphs. More graphs are made until there are this many.
+        Smallest number of chains over all graphs. More than ``graphs`` graphs are made until this
+        number of chains is reached.
     most : int
         Largest number of hand sequences in a graph (:func:`chains_of`).
     spread : bool
         True to yield, after each chain of a task for two hands, a copy in which the idle arm moves
-        in equal steps (:func:`move_other_arm`). The copies do not count towards ``chains``.
+        in equal steps (:func:`move_other_arm`). These copies are not counted in the number
+        ``chains``.
 
     Yields
     ------
@@ -303,8 +305,9 @@ def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
     """Return a copy of a chain in which idle arms move towards their next posture.
 
     In a chain, an arm moves only on the way to the goals that its hand hits. In the copy, the
-    movement of an arm from one such goal (or the start) to the next is divided into equal changes,
-    one for each goal on the way. After the last goal that its hand hits, an arm does not move.
+    change of the arm from one of these goals (or from the start) to the next of these goals is
+    divided into equal changes, one for each goal on the way. After the last goal that its hand
+    hits, an arm does not move.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ A goal posture is a configuration in which the hand is in its goal. Unlike null-
 hand rarely binds, because the joints prefer to go straight to a posture that hits the goal anyway.
 The ``details`` of a run count the control steps in which the priority binds.
 
-The controller has a **posture** for the current goal and for each goal ahead. The cascade of two
+The controller stores a **posture** for the current goal and for each goal ahead. The cascade of two
 quadratic programmes (:mod:`coartic.baselines.cascade`) computes both the changes of the postures
 and the control steps: level 1 moves the hand into a disc, and level 2 moves the joints towards a
 preferred configuration. A regular polygon inscribed in the disc takes the place of the disc, so
@@ -44,8 +44,8 @@ of a prototype. Three numbers were varied, one at a time:
   segment from the posture to the next posture has this weight.
 - *Goals ahead.* Number of goals after the current goal whose postures are part of the path.
 
-The table has the mean gap of ``goals-ahead`` to the best known path for each value. A star marks
-the value that is used. The second and the third number were varied with a least speed of 0.1:
+The table shows, for each value, the mean gap of ``goals-ahead`` to the best known path. A star
+marks the value that is used. The second and the third number were varied with a least speed of 0.1:
 
 ==========================  ===================================================================
 least speed                 0: 2.2 %, 0.03 ★: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
@@ -100,14 +100,14 @@ class PostureController(Controller):
     ) -> dict[Aim, Array]:
         """Find a posture for each aim, and return them as the memory.
 
-        1. If ``memory`` has a posture for an aim, that posture is used. Otherwise an iterative
+        1. If ``memory`` contains a posture for an aim, that posture is used. Otherwise an iterative
            descent finds one. The descent begins at the posture for the aim before, or at ``q`` for
            the first aim.
         2. If there is more than one aim, all postures are then moved to shorten the path from ``q``
            through the postures (:meth:`sweep`).
 
-        Each of these iterations ends after at most 400 steps. If it has not converged by then, a
-        posture may miss its goal.
+        Each descent ends after at most 400 steps, and so does the shortening of the path. If one of
+        them has not converged by then, a posture may miss its goal.
 
         Parameters
         ----------
@@ -162,9 +162,10 @@ class PostureController(Controller):
         """Shorten the path from ``q`` through all postures, by one step of each posture.
 
         Each posture makes a step towards a preferred posture (:meth:`step_nearer`). The preferred
-        posture is the mean of the two neighbours of the posture on the path, weighted by the
-        inverse of their distances (Weiszfeld's algorithm, 1937). The neighbour before the first
-        posture is ``q``. The last posture has only one neighbour, which is its preferred posture.
+        posture is the mean of the two neighbours of the posture on the path, each weighted by the
+        inverse of its distance from the posture (Weiszfeld's algorithm, 1937). The neighbour before
+        the first posture is ``q``. The last posture has only one neighbour, which is its preferred
+        posture.
 
         Parameters
         ----------

@@ -8,7 +8,7 @@ With one stage, the default, the noise does not depend on earlier rewards. So ra
 learn to coarticulate. Its best trial shows what selection alone does: one of many noisy trials is
 selected by the reward of the whole task. Therefore random search is the control for the signatures
 of coarticulation (:mod:`coartic.analysis.control`). Random search stores nothing but its best
-trial; so with motor noise, too, its solution has the targets of the best trial.
+trial; so, also with motor noise, the targets of its solution are those of the best trial.
 
 With ``stages`` above 1 the trials are divided into equal parts. After each part, the centre of the
 noise moves to the best trial so far. Parameter ``keep`` decides whether the new centre consists of
@@ -161,8 +161,8 @@ class RandomSearchHands(Method):
     def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`.
 
-        The number is chosen so that the sessions together make at most 4,000,000 trials; it is at
-        least 1 and at most 72.
+        The number is from 1 to 72. If it is above 1, the sessions together make at most 4,000,000
+        trials.
         """
         return runs_at_once(self.parameters.trials)
 
@@ -170,11 +170,9 @@ class RandomSearchHands(Method):
         """Divide the trials among the hand sequences, and return the movements of the best trial.
 
         The numbers of trials of two sequences differ by at most one. If the corrective process
-        fails with a sequence, the other trials of this sequence are not made. The details have the
-        number of sequences with which the corrective process has hit every goal.
-
-        Raises MethodError if the corrective process hits every goal with no sequence that has a
-        trial.
+        fails with a sequence, the other trials of this sequence are not made. The details contain
+        the number of sequences with which the corrective process has hit every goal. Raises
+        MethodError if the corrective process hits every goal with no sequence that has a trial.
         """
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
@@ -203,8 +201,8 @@ class RandomSearch(RandomSearchHands):
     def solve(self, session: Session) -> Result:
         """Make trials until none is left, and return the movements of the best trial.
 
-        The details have the number of trials with noise. Raises MethodError if no trial is left to
-        make, or if the corrective process completes the task with none of the sequences tried.
+        The details contain the number of trials with noise. Raises MethodError if no trial is left
+        to make, or if the corrective process completes the task with none of the sequences tried.
         """
         parameters: RandomSearchParameters = self.parameters
         with session.solving():

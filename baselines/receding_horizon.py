@@ -5,10 +5,10 @@ searches, over all hand sequences, for the shortest path through the goals of th
 the first movement of this path, and then plans again from the end of the movement.
 
 - With ``horizon`` 0 the planner takes the shortest path to each goal.
-- If the window contains the last goal, all its movements are made, because planning again would
-  find the same movements.
-- If the horizon covers all goals, the planner plans the whole task at once. Its gap to the optimum
-  is then due only to its smaller search effort.
+- If the window contains the last goal, all movements of the window are made, because planning again
+  would find the same movements.
+- If the horizon covers all goals, the planner plans the whole task at once. The gap to the optimum
+  is then due only to the smaller search effort.
 
 A window is planned as ``optimum/search`` plans a task (:mod:`.shortest_paths`): by chains of
 posture graphs, IPOPT, and rounding to whole ticks. To save time, there are fewer chains, the graphs
@@ -86,8 +86,8 @@ class RecedingHorizon(Method):
     def solve(self, session: Session) -> Result:
         """Plan window by window, and return the movements that were made.
 
-        The details have the length of the path before rounding (``path_length``, in a mix of length
-        units and rad), and the numbers of windows, of solves and of failed solves. Raises
+        The details contain the length of the path before rounding (``path_length``, in a mix of
+        length units and rad), and the numbers of windows, of solves and of failed solves. Raises
         MethodError if no path through a window is found.
         """
         task, parameters = session.reveal(*self.information), self.parameters

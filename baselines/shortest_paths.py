@@ -114,8 +114,8 @@ def fewest_ticks(
     Parameters
     ----------
     session : Session
-        Session that counts the solver's effort and the evaluations of forward kinematics. The
-        iterations and Jacobians of corrections are not counted.
+        Session that counts the solver's effort and the evaluations of forward kinematics.
+        Iterations of the corrective process, and Jacobians that it evaluates, are not counted.
     task : Task
     problem : TrajectoryProblem
         Problem of cost ``path-length``.

@@ -156,8 +156,8 @@ class TrajectoryOptimisation(Method):
         (:meth:`.Rounding.nearest`). If that fails, the plan is solved again with targets well
         inside the discs of the goals.
 
-        The details have the cost of the cheapest plan and its path length. They also have two dicts
-        keyed by hand sequence: the costs of all plans, and the reasons why IPOPT failed. Raises
+        The details contain the cost and the path length of the cheapest plan, and two dicts keyed
+        by hand sequence: the costs of all plans, and the reasons why IPOPT failed. Raises
         MethodError if IPOPT converges for no hand sequence, or if a goal has no posture in a graph.
         """
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
@@ -218,7 +218,8 @@ class TrajectoryOptimisation(Method):
 
         The starts of a sequence are
 
-        - its cheapest chain in each random graph that has one;
+        - the cheapest chain of the sequence in each random graph that contains a chain of the
+          sequence;
         - with two hands (except for jerk of the hand), copies of these chains in which the idle arm
           moves in equal steps;
         - copies of the first start with noise.
@@ -352,9 +353,10 @@ def path_movements(
     """Divide a path into movements of kind ``path``, one for each goal.
 
     A movement ends where the hand enters its goal, usually before the end of the piece of the path
-    that leads to this goal. The next movement therefore begins with the rest of that piece. Joints
-    that ``instance`` holds on the way to the next goal do not move in the rest. A movement that
-    misses its goal is returned like the others.
+    that leads to this goal. The next movement therefore begins with the remaining waypoints of that
+    piece. At these waypoints, the joints that ``instance`` holds during the next movement keep the
+    angles that they have at the start of this movement. A movement that misses its goal is
+    returned, too.
 
     Parameters
     ----------

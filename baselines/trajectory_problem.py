@@ -194,8 +194,8 @@ class PathPlan:
         Returns
         -------
         ndarray, shape (G,)
-            Euclidean distances with the weight of the base, in a mix of length units and rad. Also
-            for a plan whose path is curved, they are the straight distances.
+            Euclidean distances with the weight of the base, in a mix of length units and rad. They
+            are straight distances even for a plan with a curved path.
         """
         model = MotionModel(base_weight=self.base_weight)
         return segment_lengths(np.vstack([self.instance.q0, self.configurations]), model)
@@ -295,7 +295,7 @@ class TrajectoryProblem:
         instance : Instance
             Start, goals, hands and held joints.
         start : ndarray, shape (G, dof)
-            Configuration at each goal from which the solver starts.
+            Initial guess of the solver: a configuration at each goal.
         lengths : ndarray, shape (G,), optional
             Largest joint-space length of each segment; NaN for a segment of any length. By default
             segments may have any length. Only for cost ``path-length``.
@@ -310,8 +310,8 @@ class TrajectoryProblem:
         Returns
         -------
         PathPlan
-            The plan. Its ``converged`` is True if IPOPT reports success and all constraints hold to
-            within 1e-8. A plan that has not converged is returned as well.
+            The plan. Attribute ``converged`` is True if IPOPT reports success and all constraints
+            hold to within 1e-8. A plan that has not converged is returned as well.
         """
         goals, at = self._goals, self._at
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)

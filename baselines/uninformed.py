@@ -143,8 +143,8 @@ class Attempts:
         targets : ndarray, shape (N, G, dof)
             Targets, in length units and rad; NaN for joints that do not move. N is at least 1.
         until : ndarray, shape (N,), optional
-            Threshold of the reward for each trial. The first trial whose reward exceeds its
-            threshold is the last trial made.
+            Threshold of the reward for each trial. The first trial whose reward exceeds the
+            threshold for this trial is the last trial that is made.
 
         Returns
         -------
@@ -188,8 +188,9 @@ class Attempts:
         Parameters
         ----------
         recommended : callable, optional
-            Function that returns the movements that the method recommends. With motor noise it is
-            called, and its movements take the place of those of the best trial.
+            Function that returns the movements that the method recommends. With motor noise, this
+            function is called, and the movements that it returns take the place of those of the
+            best trial.
         **details
             Details of the result, in addition to ``best_trial``, the number of the best trial from
             0.

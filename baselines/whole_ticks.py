@@ -47,8 +47,8 @@ class TickPlan:
 class Rounding:
     """Round plans of one problem and instance to whole steps.
 
-    In all functions, parameter ``merged`` has the numbers (from 0) of the goals to which there is
-    no movement, because the hand is already inside the goal when the goal becomes current. The
+    In all functions, parameter ``merged`` contains the numbers (from 0) of the goals to which there
+    is no movement, because the hand is already inside the goal when the goal becomes current. The
     session counts the effort of the solver.
     """
 
@@ -192,12 +192,12 @@ class Rounding:
         *,
         deep: Sequence[int] = (),
     ) -> PathPlan:
-        """Solve for a locally shortest plan from a start.
+        """Solve for a locally shortest plan, beginning from an initial guess.
 
         Parameters
         ----------
         start : ndarray, shape (G, dof)
-            Configuration at each goal from which the solver starts.
+            Initial guess of the solver: a configuration at each goal.
         lengths : ndarray, shape (G,)
             Largest joint-space length of each movement; NaN for a movement of any length.
         merged : tuple of int
@@ -231,8 +231,8 @@ def movements(
 ) -> tuple[Movement, ...]:
     """Return the movements of a plan, one for each goal.
 
-    Joints that ``instance`` holds on the way to a goal keep the values that they have at the end of
-    the movement before, even if that movement ended before its target.
+    A joint that ``instance`` holds on the way to a goal keeps the angle that it has at the end of
+    the movement before, even if the movement before ended before its own target.
 
     Parameters
     ----------

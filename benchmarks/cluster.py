@@ -72,8 +72,8 @@ class Dask:
 
             - the scheduler does not answer, or the connection to it is lost;
             - the scheduler has no worker for 10 minutes;
-            - a job fails in three attempts, because the workers have another version or other code
-              of the job's method, or cannot perform the job;
+            - a job fails in three attempts, because the version or the code of the job's method
+              differs on the workers, or because they cannot perform the job;
             - the extra ``cluster`` is not installed on this machine.
         """
         client = self._client()
@@ -141,8 +141,8 @@ def _remote(job: Job) -> list[Outcome]:
     """Perform a job on the machine of a Dask worker, in a separate process.
 
     Return the outcome of each run, with the environment of the worker's machine. Raises
-    CoarticError if the method has another version or other code on that machine, or if processes
-    cannot start there.
+    CoarticError if the version or the code of the method differs on that machine, or if processes
+    cannot start on it.
     """
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method, used = job.cell.method, current_environment()

@@ -149,8 +149,8 @@ def _solution(info: MethodInfo, runs: _Runs) -> Iterator[str]:
 def _changes(runs: _Runs, kind: str, how: str) -> Iterator[str]:
     """Yield the differences between the runs of one kind and the first runs.
 
-    The run of kind ``kind`` on a task is compared with the run of kind ``first`` on the same task.
-    ``how`` is the beginning of each sentence; the name of the task replaces its ``{}``.
+    On each task, the run of kind ``kind`` is compared with the run of kind ``first``. ``how`` is
+    the beginning of each sentence; the name of the task replaces its ``{}``.
     """
     for task, run in runs.get(kind, {}).items():
         yield from (f"{how.format(task)}: {c}" for c in compare_runs(runs["first"][task], run))
@@ -201,8 +201,8 @@ def _noise(info: MethodInfo, runs: _Runs) -> Iterator[str]:
 def _is_best_trial(run: Row) -> bool:
     """Return whether the solution of a noisy run seems to be its best trial.
 
-    The solution is executed with the noise draw of the best trial. If the solution has the
-    movements of the best trial, this execution takes as many ticks as the best trial; another
+    The solution is executed with the noise draw of the best trial. If the solution consists of the
+    movements of the best trial, this execution takes as many ticks as the best trial. Any other
     solution takes as many ticks only by chance. If all trials have the same reward, the result is
     False.
     """
@@ -278,7 +278,7 @@ second function returns a sentence on what was checked; it is called if there is
 
 
 def _hopeless_task(like: Task) -> Task:
-    """Return a copy of a task with one goal, which is out of reach."""
+    """Return a copy of a task in which one goal, out of reach, replaces all goals."""
     return like.model_copy(
         update={
             "name": "hopeless",

@@ -4,8 +4,8 @@ Results folders can be joined if all of them agree in
 
 - the suite, its seed and the trial budget;
 - the task that each task name stands for;
-- the version or code of each method. (Runs of a method from a file whose code has changed since are
-  an exception: they are left out, and a warning names the method);
+- the version or code of each method. (There is an exception: if the code of a method from a file
+  has changed since its runs were made, these runs are left out, and a warning names the method);
 - the parameters of each method and setting on each task.
 
 The folders may come from different machines, and from different versions of coartic and of
@@ -43,9 +43,9 @@ def include_folders(
 ) -> list[Job]:
     """Copy the runs of other folders into a results folder, and join their plans.
 
-    A cell is a method with its parameters on a task. The joined plan has the cells of ``plan``, and
-    each cell of the other folders whose run 0 is stored there. The joined plan replaces the plan of
-    ``out``. This function performs no missing runs; :func:`.perform` does.
+    A cell is a method with its parameters on a task. The joined plan consists of the cells of
+    ``plan``, and of the cells of the other folders whose run 0 is stored there. The joined plan
+    replaces the plan of ``out``. This function performs no missing runs; :func:`.perform` does.
 
     Parameters
     ----------
@@ -84,9 +84,10 @@ def include_folders(
         One of these is the case:
 
         - a folder lacks runs of its own plan;
-        - a folder has a cell that ``plan`` lacks, of a stochastic method, with fewer runs than the
-          largest number of runs that ``plan`` asks for;
-        - a folder has runs of a method from a file, made by other code than that in ``methods``.
+        - a folder contains a cell of a stochastic method that ``plan`` lacks, with fewer runs than
+          the largest number of runs that ``plan`` asks for;
+        - a folder contains runs of a method from a file that were made by other code than the code
+          in ``methods``.
     """
     if any(job.numbers[0] for job in plan):
         raise CoarticError(
@@ -130,11 +131,12 @@ def _join(
     A cell is left out if
 
     - its task is not in ``tasks`` (None stands for all tasks);
-    - its method is from a file, and has other code than in ``known`` (a warning says so);
-    - it is not in ``plan``, and no folder has its run 0.
+    - its method is from a file, and the code of the method differs from the code in ``known`` (a
+      warning says so);
+    - it is not in ``plan``, and no folder contains run 0 of the cell.
 
-    A cell of the joined plan has runs 0, 1, 2, ...: at first all runs that ``plan`` asks for, then
-    each next run that a folder has, up to the first run that no folder has.
+    The runs of a cell of the joined plan are numbered from 0 without gaps. They are all runs that
+    ``plan`` asks for, and then each next run, as long as it is stored in one of the folders.
 
     Parameters
     ----------
@@ -292,8 +294,8 @@ def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 def _check_same_results(stores: Mapping[str, Store]) -> None:
     """Raise CoarticError if two results folders have different results of the same run.
 
-    ``stores`` is a dict that maps the name of each folder to its store. If a folder stores only
-    some of the rewards of a run, only these rewards are compared.
+    ``stores`` is a dict that maps the name of each folder to its store. If only some of the rewards
+    of a run are stored in one of the folders, only these rewards are compared.
     """
     first_results = dict[str, tuple[str, str]]()
     for name, store in stores.items():

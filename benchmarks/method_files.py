@@ -148,8 +148,8 @@ def check_code(info: MethodInfo) -> None:
 def _declarations(path: Path, shown: str) -> list[MethodInfo]:
     """Import a method file, and return the declarations of its methods.
 
-    Each declaration has the hash of the method's code (:func:`_code_of`), and the installed
-    packages that the file, or another file of the user that it loads, imports.
+    Each declaration contains the hash of the method's code (:func:`_code_of`), and the installed
+    packages that are imported by the file, or by another file of the user that it loads.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
 
 
 def _user_files(names: Iterable[str]) -> set[Path]:
-    """Return the files of those loaded modules that belong to the user.
+    """Return the files of the loaded modules that belong to the user.
 
     ``names`` are the names of the modules; :func:`.is_users` says which modules are the user's.
     """
@@ -261,7 +261,7 @@ def _user_files(names: Iterable[str]) -> set[Path]:
 
 
 def _packages_of(files: Iterable[Path]) -> dict[str, str]:
-    """Return a dict that maps each installed package that Python files import to its version.
+    """Return the installed packages that Python files import, as a dict from names to versions.
 
     Modules of the standard library and of coartic are left out.
     """

@@ -144,19 +144,23 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
     Returns
     -------
     list of Job
-        A job for each cell (a method with its parameters on a task) that has runs.
+        A job for each cell (a method with its parameters on a task) that has runs. A method that
+        does not depend on a seed has only run 0. Its cells are left out, without an error, if
+        ``runs`` is a range that does not begin at 0, and another planned method depends on a seed.
 
     Raises
     ------
     CoarticError
         One of these is the case:
 
-        - a task, a method or a family is unknown, or has the name of another one;
+        - a task, a method or a family is unknown, or two tasks, methods or families have the same
+          name;
         - an option or a parameter of a method has a wrong value;
-        - ``trials``, ``runs`` (except 1) or a family file has no effect;
+        - ``trials`` or a family file has no effect;
+        - ``runs`` asks for runs other than run 0, although no planned method depends on a seed;
         - two cells of the suite differ only in their numbers of trials, so that ``trials`` would
           make them equal;
-        - a task or method that the options name has no runs;
+        - a task or method that the options name belongs to no cell of the plan;
         - two blocks of the suite ask for different numbers of runs of the same cell;
         - a block without wildcards names a method that does not apply to all tasks of the block.
 
@@ -236,8 +240,9 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
 def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
     """Return the ids of the methods in the user's files that nothing names.
 
-    These are all methods of each file of which neither the request (``methods``) nor a block of the
-    suite names a method. The wildcard ``"*"`` of the request does not count as naming a method.
+    If neither the request (``methods``) nor a block of the suite names a method of a file, all
+    methods of this file are returned. The wildcard ``"*"`` of the request names no method in this
+    sense.
     """
     files = {
         registered[method].where
@@ -256,7 +261,10 @@ def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> li
 
 
 def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
-    """Raise CoarticError if ``trials``, ``runs`` (except 1) or a family file has no effect."""
+    """Raise CoarticError if ``trials``, ``runs`` or a family file has no effect.
+
+    A request for one run (``runs`` = 1) is always allowed.
+    """
     methods = {job.cell.method.name: job.cell.method for job in jobs}
     if request.trials and not any("trials" in method.defaults for method in methods.values()):
         raise CoarticError(
@@ -281,8 +289,8 @@ def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
 def _check_trials(trials: int, jobs: Iterable[Job]) -> None:
     """Raise CoarticError if two cells differ only in their numbers of trials.
 
-    With ``trials`` as the number of trials of both, the two cells would be equal. ``jobs`` are the
-    jobs of the suite with the numbers of trials that the suite sets.
+    Such cells would be equal if both had ``trials`` trials. ``jobs`` are the jobs of the suite,
+    with the numbers of trials that the suite sets.
     """
     first_jobs = dict[str, Job]()
     for job in jobs:
@@ -456,8 +464,8 @@ def _job_of(
     - the world: the block or the suite (``world``), the request, the paper's world;
     - the limit of CPU time: the request, the suite.
 
-    A method that is not stochastic has only run 0; it has no runs if the runs of the request do not
-    begin at 0.
+    A method that is not stochastic has only run 0. Its job has no runs if the runs of the request
+    do not begin at 0.
     """
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:
@@ -487,7 +495,7 @@ def _why_nothing_runs(
     request : Request
     idle : sequence of Task
         Tasks that the request names and on which none of the methods runs. The sentence explains
-        only the first of them. If there are none, it explains the tasks of ``jobs``.
+        only the first of them. If ``idle`` is empty, the sentence explains the tasks of ``jobs``.
     methods : iterable of MethodInfo
         The methods that the request asks for.
     jobs : sequence of Job

@@ -1,15 +1,15 @@
 """Perform jobs in worker processes on this machine, with limits of CPU and wall time.
 
-Built-in methods share worker processes. Each method from a file has its own processes, so that it
-cannot break other methods. There are two limits:
+Built-in methods share worker processes. For each method from a file there are separate processes,
+so that this method cannot break other methods. There are two limits:
 
 - *CPU time.* The operating system counts the CPU time of all threads of a process, and ends the
   process when its job has used up the limit (timer ``ITIMER_PROF``, signal ``SIGPROF``).
 - *Wall time.* The package ``pebble``, which starts and restarts the processes, ends a job that
   exceeds the limit.
 
-When a worker process ends, the processes that it has started end, too, unless they have left its
-process group.
+When a worker process ends, the processes that it has started end, too, unless they have left the
+process group of the worker.
 """
 
 from __future__ import annotations
@@ -63,10 +63,10 @@ _REPEATED = (-signal.SIGKILL, 255)  # exit codes of a process that was killed or
 def process_pool(processes: int, context: Any = PROGRAM_CONTEXT) -> Iterator[ProcessPoolExecutor]:
     """Open a pool of processes that round floating-point numbers like the workers of suites.
 
-    Use this context manager in programs that run methods or proofs themselves. The processes have
-    the environment variables of workers, with which all x86-64 processors with AVX2 round alike. By
-    default each process imports the main program, as ``multiprocessing`` usually does. So call this
-    function behind ``if __name__ == "__main__":``.
+    Use this context manager in programs that run methods or proofs themselves. The processes are
+    started with the environment variables of workers, with which all x86-64 processors with AVX2
+    round alike. By default each process imports the main program, as ``multiprocessing`` usually
+    does. So call this function behind ``if __name__ == "__main__":``.
 
     Parameters
     ----------
@@ -94,9 +94,9 @@ def process_pool(processes: int, context: Any = PROGRAM_CONTEXT) -> Iterator[Pro
 class Local:
     """Executor that performs jobs in processes on this machine.
 
-    The limit of the CPU time of a job is that of the job, or a day if the job has none. The limit
-    of its wall time is three times the limit of CPU time plus ``timeout_s``. A job that reaches one
-    of the limits is ended.
+    The limit of CPU time is set by each job; without such a limit it is a day. The limit of wall
+    time is three times the limit of CPU time plus ``timeout_s``. A job that reaches one of the
+    limits is ended.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class Local:
     ------
     ValueError
         ``jobs`` is neither -1 nor from 1 to 10,000, ``timeout_s`` is not from 0 to 1,000,000, or an
-        argument has another type.
+        argument has a wrong type.
     """
 
     @checked_arguments
@@ -182,7 +182,7 @@ class Local:
     def _perform(self, groups: Sequence[_Group]) -> Iterator[tuple[Job, list[Outcome]]]:
         """Yield each job of the groups with its outcomes, as jobs finish.
 
-        A group is closed after its last job.
+        The processes of a group are ended after the last job of the group (:meth:`_Group.close`).
         """
         running, repeated = dict[Future[Any], tuple[_Group, int, Job]](), set[int]()
         while running or any(group.waiting for group in groups):
@@ -259,7 +259,7 @@ class Local:
     def _failure(self, job: Job, error: BaseException, printed: str) -> list[Outcome]:
         """Return the outcomes of a job that raised an error instead of returning an answer.
 
-        ``printed`` has the last lines that the process of the job wrote to standard error.
+        ``printed`` are the last lines that the process of the job wrote to standard error.
         """
         if isinstance(error, TimeoutError):
             wall_s = self.wall_limit_s(job)
@@ -282,8 +282,8 @@ class Local:
 class _Group:
     """Jobs that share one pool of processes.
 
-    One group has the jobs of all built-in methods, and each method from a file has its own group.
-    If jobs are performed in order, each built-in method has its own group, too.
+    One group contains the jobs of all built-in methods; there is a further group for each method
+    from a file. If jobs are performed in order, there is a group for each built-in method, too.
     """
 
     local: Local

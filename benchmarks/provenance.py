@@ -47,8 +47,8 @@ def current_environment() -> dict[str, Any]:
         - ``coartic``, ``python``: versions of coartic and of Python;
         - ``packages``: dict that maps libraries (numpy, scipy, ...) to their versions;
         - ``model_code``: hash of the files of the model (:data:`MODEL_FILES`);
-        - ``commit``: id of the commit of the checkout, and whether files were changed since; None
-          for an installed package;
+        - ``commit``: dict with the id of the commit of the checkout (``id``), and whether tracked
+          files were changed since (``dirty``); None for an installed package;
         - ``platform``, ``processor``: names of the operating system and of the processor;
         - ``cores``: number of cores that this process may use;
         - ``arithmetic``: fingerprint of how libraries round (:func:`arithmetic`);
@@ -124,8 +124,8 @@ def arithmetic() -> str:
     """Return a fingerprint of how workers round, in the form ``NumPy HASH, libm HASH``.
 
     A new process with the environment variables of a worker computes some numbers by NumPy, and
-    some by the C library (libm). Each hash is computed from the bits of these numbers. If two
-    machines have the same hash for a library, the library rounds these numbers alike on both.
+    some by the C library (libm). Each hash is computed from the bits of these numbers. If the hash
+    of a library is the same on two machines, the library rounds these numbers alike on both.
     """
     with process_pool(1, CONTEXT) as pool:
         return pool.submit(_arithmetic).result()

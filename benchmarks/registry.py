@@ -45,8 +45,8 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
     Raises
     ------
     CoarticError
-        A file cannot be loaded or has no method, or the id of a method is not allowed
-        (:func:`check_id`).
+        A file cannot be loaded or defines no method (:func:`.read_file`), or the id of a method is
+        not allowed (:func:`check_id`).
     """
     infos = dict(built_in())
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
@@ -91,7 +91,7 @@ def check_id(name: str, origin: str, registered: Registry) -> None:
           or one of ``._+/-``, or has more than 80 characters;
         - the id begins with ``dual-process/`` or ``optimum/``;
         - the id is a known id, the id of an exploration condition or one of :data:`NAMES`, where
-          upper and lower case count as equal.
+          upper and lower case are treated as equal.
     """
     if not METHOD_NAME.fullmatch(name):
         raise CoarticError(

@@ -26,8 +26,8 @@ from coartic.runs.store import open_store
 def find_run(prefix: str, folder: Path) -> Row:
     """Return the one run of a results folder whose id begins with ``prefix``.
 
-    Raises CoarticError if the prefix is empty or has characters that no id has, if the id of no run
-    or of more than one run begins with it, or if the folder cannot be read.
+    Raises CoarticError if the prefix is empty or contains characters that never occur in an id, if
+    no id or more than one id begins with the prefix, or if the folder cannot be read.
     """
     where = quote(str(folder))
     if not prefix or not set(prefix) <= set("0123456789abcdef-."):
@@ -148,8 +148,8 @@ def perform_runs_again(runs: Sequence[Row], registered: Registry) -> Iterator[tu
 def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
     """Select stored runs of a folder that can be performed here: every k-th run.
 
-    A run of the plan can be performed here if its method has the same version or code in
-    ``registered``. If the folder has n such runs, k is n divided by ``count``, rounded down, but at
+    A run of the plan can be performed here if ``registered`` contains its method with the same
+    version or code. If n runs can be performed, k is n divided by ``count``, rounded down, but at
     least 1; at most ``count`` runs are selected.
 
     Parameters
@@ -191,8 +191,8 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
 def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int, list[str]]:
     """Execute solutions of a folder with motor noise again, and compare the mean ticks.
 
-    The noise of a run has the same seed as in the scoring of the run (:func:`.with_noise`). If the
-    stored ticks of a run follow another version of the rule of noise, they are not compared.
+    The seed of the noise of a run is the same as in the scoring of the run (:func:`.with_noise`).
+    If the stored ticks of a run follow another version of the rule of noise, they are not compared.
 
     Parameters
     ----------

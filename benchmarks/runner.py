@@ -180,11 +180,11 @@ def perform(
 ) -> Progress:
     """Perform the runs of a plan that a results folder lacks.
 
-    - *Plan.* ``plan`` replaces the plan that the folder has stored. Runs that the new plan does not
-      ask for stay in the folder, but reports do not show them.
+    - *Plan.* ``plan`` replaces the plan that is stored in the folder. Runs that the new plan does
+      not ask for stay in the folder, but reports do not show them.
     - *Failures.* Runs that fail are stored and counted; no error is raised. The next call performs
-      again the runs that crashed, and the runs that timed out under a limit of CPU time below that
-      of the new plan.
+      two kinds of runs again: runs that crashed, and runs that timed out under a limit of CPU time
+      below the limit in the new plan.
     - *Interruption.* Runs that finished before an interruption are stored.
     - *Motor noise.* If the stored mean ticks of a run follow another version of the rule of noise,
       they are computed again.
@@ -278,9 +278,9 @@ def perform(
 def _note_quickest(run: Row, quickest: dict[str, Row]) -> None:
     """Enter a run into ``quickest`` if it is the quickest of its method.
 
-    ``quickest`` is a dict that maps the id of each method from a file to its quickest run. Runs
-    that were the first of their method in a process count as slower than all other runs. Runs whose
-    status is not ``ok``, and runs of built-in methods, are ignored.
+    ``quickest`` is a dict that maps the id of each method from a file to its quickest run. A run
+    that was the first run of its method in a process is treated as slower than all other runs. Runs
+    whose status is not ``ok``, and runs of built-in methods, are ignored.
     """
 
     def seconds(run: Row) -> tuple[bool, float]:
@@ -330,11 +330,11 @@ def _repeat_runs(
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return a job for each cell of a plan that has runs to perform.
+    """Return a job for each cell of a plan in which runs have to be performed.
 
     A run has to be performed in two cases:
 
-    - The store does not have the run.
+    - The run is not stored.
     - The stored run crashed, or timed out under a lower limit of CPU time than that of the plan,
       and the code of the method is available here.
 
@@ -368,15 +368,15 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 
 
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Divide jobs into smaller jobs for workers, in the order of their start.
+    """Divide jobs into smaller jobs, in the order in which workers should start them.
 
-    - *Size.* A method that makes many runs side by side takes less time than for the same runs one
-      by one. So a job has as many runs as the method allows (:meth:`.Method.max_batch`), but it
-      should take only some seconds, and each of the ``workers`` processes should get some of the
-      runs.
+    - *Size.* Many methods need less time for many runs side by side than for the same runs one by
+      one. So a job has as many runs as the method allows: :meth:`.Method.max_batch` for a built-in
+      method, and one run for a method from a file. A job is smaller if it would take more than
+      some seconds, or if some of the ``workers`` processes would get no runs.
     - *Order.* Jobs with more trials start earlier, so that no long job is left alone at the end.
-      Jobs of methods without a number of trials, such as planners, start first, because one of
-      their runs can take as long as thousands of trials.
+      Jobs of methods without a number of trials, such as planners, start first, because one run of
+      such a method can take as long as thousands of trials.
     """
 
     def divide(job: Job, size: int) -> Iterator[Job]:

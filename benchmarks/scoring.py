@@ -33,10 +33,10 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Row]:
 
     - A part that is too long or breaks the rules of the task is not executed; the run then has
       status ``solver-failed``.
-    - Only runs whose final status is ``ok`` have movements and a score.
+    - Movements and a score are returned only for runs whose final status is ``ok``.
     - In a world with motor noise, only the solution is scored: the movements that the method
-      recommends to make next. They are stored without ticks, and corrective movements without
-      targets.
+      recommends to make next. These movements are stored without ticks, and corrective movements
+      also without targets.
 
     Parameters
     ----------
@@ -90,9 +90,9 @@ def with_noise(runs: Sequence[Row]) -> list[Row]:
       motor noise 0.01, or None if one of them fails. The seed of the noise is the hexadecimal
       number before the hyphen in the id of the run.
     - In a world with motor noise, ``mean_ticks`` is the mean number of ticks over the executions in
-      this world, and ``failed_executions`` is the number of failed executions. A failed execution
-      counts as twice the ticks of the corrective process with its best hands. The seed of the noise
-      is :func:`.judge_seed`, the same for all methods.
+      this world, and ``failed_executions`` is the number of failed executions. For a failed
+      execution, twice the ticks of the corrective process with its best hands are used. The seed of
+      the noise is :func:`.judge_seed`, the same for all methods.
     - In any other world nothing is executed.
 
     Parameters
@@ -128,7 +128,7 @@ def with_noise(runs: Sequence[Row]) -> list[Row]:
 def _judge(runs: Sequence[Row], answers: Sequence[Sequence[Movement]]) -> list[dict[str, Any]]:
     """Return ``mean_ticks`` and ``failed_executions`` of each run in a world with motor noise.
 
-    ``answers`` has the recommended solution of each run. All runs must be of one cell.
+    ``answers`` contains the recommended solution of each run. All runs must be of one cell.
     """
     cell = runs[0].cell
     seeds = [run.job.judge_seed(run["run"]) for run in runs]

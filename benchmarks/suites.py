@@ -60,8 +60,8 @@ _Number = Annotated[int, Field(ge=1, strict=True)]
 def _worlds(value: Any) -> tuple[MotionModel, ...]:
     """Validate a table ``model``, and return the worlds that it describes.
 
-    The table maps constants (:data:`.WORLD`) to a value or to a list of values. The result has a
-    world for each combination of the values. A tuple of worlds is returned unchanged. Raises a
+    The table maps constants (:data:`.WORLD`) to a value or to a list of values. The result contains
+    a world for each combination of the values. A tuple of worlds is returned unchanged. Raises a
     validation error for an unknown constant, a wrong value or an empty table.
     """
     if isinstance(value, tuple) and all(isinstance(world, MotionModel) for world in value):
@@ -268,7 +268,8 @@ def _read_suite(path: Path) -> Suite:
 def errors_of_block(suite: Suite, number: int) -> Iterator[None]:
     """Add a suite's name and a block's number to errors of a ``with`` block.
 
-    The message of each CoarticError begins with them. ``number`` counts the blocks from 1.
+    The message of each CoarticError begins with the name of the suite and the number of the block,
+    ``number``, from 1.
     """
     try:
         yield
@@ -313,12 +314,11 @@ def tasks_of(block: _Block, own: Collection[str], task_named: TaskNamed) -> Iter
 def _changed_tasks(task: Task, block: _Block) -> list[Task]:
     """Return the tasks that a block of a suite makes of a task.
 
-    - With ``free_base`` the base is freed.
-    - With ``move`` there is a task for each displacement of the goal.
-    - Otherwise the list has only the task itself.
-
-    Raises CoarticError if the base is free already, if the task does not have the goal, or if a
-    displaced goal is out of reach.
+    - If the block has ``free_base``, the base is freed. Raises CoarticError if it is free already.
+    - If the block has ``move``, the list contains a task for each displacement of the goal that
+      ``move`` names. Raises CoarticError if the task does not have this goal, or if the displaced
+      goal is out of reach.
+    - A block can have both. If it has neither, the list contains only the task itself.
     """
 
     def changed(name: str, difference: str, **changes: Any) -> Task:

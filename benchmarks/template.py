@@ -10,11 +10,11 @@ from coartic import BudgetError, Objective, Optimiser
 class Mine(Optimiser):
     """Random steps from the best point, as a start for your own method.
 
-    The length of the steps follows the one-fifth rule. The length grows after a batch with a point
-    at least as good as the best point before, and shrinks after any other batch; if one batch in
-    five has such a point, the length stays about the same. On the paper's tasks the gap is 6.2
-    [6.0, 6.5] %, and the gap of the paper's learner is 7.9 %. With motor noise the best cost was
-    partly lucky, so that the steps become too short: improve this first.
+    The length of the steps follows the one-fifth rule. The length grows after a batch that contains
+    a point at least as good as the best point before, and shrinks after any other batch. If one
+    batch in five contains such a point, the length stays about the same. On the paper's tasks the
+    gap is 6.2 [6.0, 6.5] %, and the gap of the paper's learner is 7.9 %. With motor noise the best
+    cost is partly luck, so that the steps become too short: improve this first.
     """
 
     name = "NAME"  # id in commands and tables

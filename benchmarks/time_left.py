@@ -37,9 +37,9 @@ class TimeLeft:
       results.
     - *Any other method.* The expected time is the mean time of the method's own finished runs, in
       proportion to the number of trials.
-    - *Weights.* Recent runs have more weight in these means than earlier ones.
-    - *Runs at once.* Their number is ``workers`` or, if that is larger, the total time of the
-      finished runs divided by the elapsed wall time.
+    - *Weights.* In both means, recent runs have more weight than earlier runs.
+    - *Runs at once.* The number of runs that are made at once is ``workers`` or, if that is larger,
+      the total time of the finished runs divided by the elapsed wall time.
 
     Several threads can use the same object.
 
@@ -116,7 +116,7 @@ class TimeLeft:
         """Return the factor between the times of finished runs and their :func:`_shipped_s`.
 
         The finished runs are those of the method's group (:func:`_group_of`). The factor is NaN
-        before the first of them.
+        before the first run of the group has finished.
         """
         usual_s = self._usual_s[_group_of(method)]
         return self._took_s[_group_of(method)] / usual_s if usual_s else math.nan

@@ -119,7 +119,7 @@ def perform_job(job: Job) -> list[Outcome]:
     """Perform the runs of a job in this process, and return their outcomes.
 
     An error that the method raises is not raised here: it becomes the outcome of the run. If the
-    job has several runs, the method makes them together (:meth:`.Method.solve_together`).
+    job has several runs, the method makes all of them in one call (:meth:`.Method.solve_together`).
 
     Parameters
     ----------

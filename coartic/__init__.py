@@ -1,8 +1,8 @@
 """coartic: computational motor control, from one kinematic robot to scored solutions.
 
-This package has the dual-process learner of Shah, Barto & Fagg (2013), *A Dual Process Account of
-Coarticulation in Motor Skill Acquisition*, and everything that other methods share with it: robot,
-tasks, movement, corrective process, execution and scoring.
+This package contains the dual-process learner of Shah, Barto & Fagg (2013), *A Dual Process Account
+of Coarticulation in Motor Skill Acquisition*, and everything that other methods share with the
+learner: robot, tasks, movement, corrective process, execution and scoring.
 """
 
 from typing import TYPE_CHECKING

@@ -20,8 +20,8 @@ class SolutionError(CoarticError):
 class NotApplicableError(CoarticError):
     """A method or condition does not apply to a task.
 
-    For example, an exploration condition uses a hand that the task or the first solution does not
-    have, or a search for the initial hands finds no sequence that completes the task.
+    For example, an exploration condition uses a hand that does not occur in the task or in the
+    first solution, or a search for the initial hands finds no sequence that completes the task.
     """
 
 

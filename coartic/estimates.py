@@ -1,8 +1,8 @@
 """Means and differences of means, with confidence intervals.
 
-A sample has the rewards or other scores of independent runs. The confidence intervals are those of
-the BCa bootstrap (bias-corrected and accelerated); :func:`mean_of_means` lists the exceptions. All
-resampling here uses the same seed, :data:`SEED`.
+A sample consists of the rewards or other scores of independent runs. The confidence intervals are
+those of the BCa bootstrap (bias-corrected and accelerated); :func:`mean_of_means` lists the
+exceptions. All resampling here uses the same seed, :data:`SEED`.
 
 Source: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14.
 """
@@ -88,8 +88,8 @@ def vector(values: ArrayLike) -> Array:
     Raises ValueError if ``values``
 
     - is not a vector, or is empty;
-    - has NaN, infinite or masked entries;
-    - has an entry other than 0 whose size is not from 1e-100 to 1e100.
+    - contains NaN, infinite or masked entries;
+    - has an entry other than 0 whose absolute value is not from 1e-100 to 1e100.
     """
     sample = real_array("the sample", values)
     if sample.size == 0:
@@ -122,8 +122,8 @@ def varies(values: Array) -> Array:
 def centred(values: Array) -> Array:
     """Subtract the mean over the first axis from values.
 
-    The result has the shape of ``values``. It is 0 where values do not vary (:func:`varies`), or
-    include NaN or infinity.
+    The result has the shape of ``values``. An entry is 0 if the values along the first axis do not
+    vary (:func:`varies`), or include NaN or infinity.
     """
     return np.where(varies(values), values - np.mean(values, axis=0), 0.0)
 
@@ -295,6 +295,6 @@ def standard_deviation(values: Array) -> float:
     """Compute the standard deviation of values, with n - 1 degrees of freedom.
 
     ``values`` has shape ``(n,)``. The result is NaN for fewer than two values. For two or more
-    values it is 0 if they do not vary (:func:`varies`), or include NaN or infinity.
+    values, the result is 0 if the values do not vary (:func:`varies`), or include NaN or infinity.
     """
     return float(np.std(centred(values), ddof=1)) if len(values) > 1 else math.nan

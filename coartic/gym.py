@@ -78,8 +78,9 @@ trial."""
 class TaskEnv(gymnasium.Env):
     """Environment in which a robot makes trials of a task or family.
 
-    - *Episode.* An episode is a trial. In each step the robot reaches for the next goal, so that a
-      trial has at most as many steps as the task has goals. Trials are never truncated.
+    - *Episode.* An episode is a trial. In each step the robot reaches for the next goal, so that
+      the number of steps of a trial is at most the number of goals of the task. Trials are never
+      truncated.
     - *Reward.* The reward of a step is minus its number of control ticks. If the corrective process
       fails, the reward is -1,000,000, and the trial ends.
     - *Random numbers.* Two things can be random: the instance, if the task is a family, and the
@@ -90,7 +91,7 @@ class TaskEnv(gymnasium.Env):
     ----------
     task : Task, str or Path
         A task, or a family: its name, such as ``"two-armed/v1"``, or the path of its file. Each
-        trial of a family is on one of its instances.
+        trial of a family is a trial of one of its instances.
     split : {"development", "test", "fresh"}, optional
         Instances of the family: ``"development"`` to train on (the default), ``"test"`` to report
         on, or ``"fresh"`` for the instances of a ``year``.
@@ -115,8 +116,9 @@ class TaskEnv(gymnasium.Env):
     Notes
     -----
     Joints are the base coordinates (in length units) and the angles of the arms (in rad) that can
-    move. The arms are in the order of the task's ``hands``. In a family, observations and actions
-    have entries for the largest number of links that an arm of the family can have.
+    move. The arms are in the order of the task's ``hands``. In a family, the numbers of entries of
+    observations and actions are those for the largest number of links that an arm of the family can
+    have.
 
     An observation, float32 of shape ``(O,)``, has
 
@@ -127,15 +129,15 @@ class TaskEnv(gymnasium.Env):
     - in a family whose robots have different numbers of links, for each joint 1 if the robot can
       move it, else 0.
 
-    An action, shape ``(A,)``, has an entry for the hand, if the task has two hands, and an entry
-    for each joint. Entries for joints are clipped to the range from -1 to 1.
+    An action, shape ``(A,)``, consists of an entry for the hand, if the task has two hands, and an
+    entry for each joint. Entries for joints are clipped to the range from -1 to 1.
 
     - For each hand, the corrective process finds a posture in which this hand is at the goal. If
       the entry for the hand is at most 0.5, the hand whose posture is nearer in joint space is
       chosen. If the entry is above 0.5, the other hand is chosen.
     - The target of the movement is the posture of the chosen hand, plus :data:`REACH` times the
       entries for the joints. If the corrective process fails for the chosen hand, the present
-      configuration takes the place of its posture.
+      configuration takes the place of the posture of this hand.
     - Entries for joints that a robot cannot move have no effect.
     """
 
@@ -196,8 +198,8 @@ class TaskEnv(gymnasium.Env):
         ----------
         seed : int, optional
             Seed of the generator that draws instances, and seed of the motor noise, which begins
-            with draw 0. By default neither is seeded again, and the trial has the next draw of the
-            noise.
+            with draw 0. By default neither the generator nor the noise is seeded again, and the
+            trial is made with the next draw of the noise.
         options : dict, optional
             ``{"task": k}`` begins a trial on instance k of a family, from 0. By default the
             instance is drawn at random.
@@ -258,7 +260,7 @@ class TaskEnv(gymnasium.Env):
         ResetNeeded
             The trial has ended, or no trial was begun.
         ValueError
-            The action has another shape, or is not finite.
+            The action has a wrong shape, or is not finite.
         """
         if not self.going:
             raise ResetNeeded("the trial has ended, or none was begun: call reset first")
@@ -426,8 +428,8 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> Any:
     -------
     DummyVecEnv
         Environments, made by Stable-Baselines3's ``make_vec_env``. Rewards are divided by the ticks
-        of the corrective process (:class:`SharesOfTicks`). Entry ``episode`` of the infos has the
-        unscaled reward of a trial, in ticks.
+        of the corrective process (:class:`SharesOfTicks`). Entry ``episode`` of the infos contains
+        the unscaled reward of a trial, in ticks.
 
     Raises
     ------
@@ -458,7 +460,7 @@ def score(
     ----------
     env : str, Env, VectorEnv or VecEnv
         Id, or environment of this module. For a family, the instances of the test split are scored,
-        unless the options have another ``split``. If an environment has wrappers that change
+        unless the options name another ``split``. If an environment has wrappers that change
         observations or actions, the trials are made in the wrapped environment, on its own
         instances. The rewards in the table are nevertheless in ticks, and the statistics of
         normalising wrappers are not updated.
@@ -496,7 +498,7 @@ def score(
         - ``completed``: share of trials that hit all goals in less than 1,000,000 ticks.
 
         Reward and gap are NaN for a policy that failed in a trial, and where they are unknown.
-        ``attrs["units"]`` has the units.
+        ``attrs["units"]`` is a dict that maps columns to units.
 
     Raises
     ------
@@ -508,8 +510,8 @@ def score(
         - an agent was trained with wrappers that the environment does not have;
         - a wrapper does not pass on the options of ``reset``.
     ValueError
-        An option is wrong, a policy has the name of another row, or observations would be
-        normalised twice.
+        An option is wrong, the name of a policy is the name of another row, or observations would
+        be normalised twice.
     OSError
         The file of ``vec_normalize`` cannot be read.
 
@@ -836,8 +838,8 @@ def _table(rewards: Mapping[str, Array]) -> pd.DataFrame:
     """Return the table of :func:`score` from the rewards of its rows.
 
     ``rewards`` is a dict that maps the name of each row to its rewards (in ticks), shape ``(tasks,
-    trials)``, with NaN for a failed trial or an unknown reward. The last row has the best known
-    rewards.
+    trials)``, with NaN for a failed trial or an unknown reward. The last row contains the best
+    known rewards.
     """
     (*_, best), rows = rewards.values(), {}
     known = np.isfinite(best[:, 0])

@@ -82,8 +82,8 @@ class MotionModel(NamedTuple):
     def tolerances(self, radius: float) -> tuple[float, float]:
         """Return the tolerances of arrival and of correction, in length units.
 
-        ``radius`` is the radius of the goals, in length units. For a tolerance of None, a tenth of
-        ``radius`` is returned.
+        ``radius`` is the radius of the goals, in length units. If a tolerance of the model is None,
+        a tenth of ``radius`` is returned for it.
         """
         tenth, arrival, correction = radius / 10, self.arrival_tolerance, self.correction_tolerance
         return (
@@ -99,8 +99,8 @@ class MotionModel(NamedTuple):
         """Return a dict that maps constants to values, as stored in files.
 
         Tolerances that are None are replaced by those for goals of ``radius`` (in length units).
-        Constants of :data:`WORLD` that have the paper's value are left out, so that the ids of runs
-        do not change when a new constant is added.
+        Constants of :data:`WORLD` that are equal to the paper's constants are left out, so that the
+        ids of runs do not change when a new constant is added.
         """
         constants = self.for_radius(radius)._asdict()
         return {

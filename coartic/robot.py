@@ -5,9 +5,9 @@ configuration is the vector ``q = (base_x, base_y, left_1 .. left_n, right_1 .. 
 are in the model's length unit, angles in rad. Angles are relative: each joint is measured from the
 previous link, the first joint from +x.
 
-:func:`chain` has the formulas of the positions, :func:`lever` the formula of the Jacobian. Both
-functions work on NumPy arrays and on CasADi symbols, and are compiled for the kernels. The caller
-of :func:`chain` passes the cosine and the sine for its type of numbers.
+:func:`chain` contains the formulas of the positions, and :func:`lever` contains the formula of the
+Jacobian. Both functions work on NumPy arrays and on CasADi symbols, and are compiled for the
+kernels. The caller of :func:`chain` passes the cosine and the sine for its type of numbers.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ class Robot:
     A configuration ``q`` has shape ``(dof,)``: x and y of the base (in length units), the joint
     angles of the left arm and the joint angles of the right arm (in rad, each measured from the
     link before). Methods that accept arrays accept one configuration or many, shape ``(..., dof)``.
-    They raise ValueError if ``q`` has another shape or is not finite, or if a hand is neither
+    They raise ValueError if ``q`` has a wrong shape or is not finite, or if a hand is neither
     ``"left"`` nor ``"right"``.
     """
 
@@ -152,8 +152,8 @@ class Robot:
     def drawn_base(self) -> tuple[float, float]:
         """Width and height of the base in drawings (in length units).
 
-        If :attr:`base_size` has its default, the default is multiplied by :attr:`scale`. Otherwise
-        it is :attr:`base_size` itself.
+        If :attr:`base_size` is the default, the result is the default multiplied by :attr:`scale`.
+        Otherwise the result is :attr:`base_size` itself.
         """
         width, height = self.base_size
         is_default = self.base_size == type(self).__dataclass_fields__["base_size"].default
@@ -373,8 +373,8 @@ class Robot:
     def symbolic_hand_jerk(self, q: Sequence[Any], hand: Hand) -> Any:
         """Return the third time derivative of a hand's position as a CasADi expression.
 
-        The formula is written out by hand, because the Hessians of CasADi's own third derivatives
-        have twice as many operations.
+        The formula is written out by hand, because the Hessians of third derivatives that CasADi
+        makes itself need twice as many operations.
 
         Parameters
         ----------

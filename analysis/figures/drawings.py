@@ -88,10 +88,10 @@ def draw_ranking(study: Study) -> Parts | None:
 def _draw_parameters(study: Study) -> Parts | None:
     """Draw the gap of each value of each varied parameter, a panel for each.
 
-    A panel has the means of table ``parameters``. If several parameters vary, a panel also has the
-    gaps at the best values of the other parameters. If only one parameter varies, the panel also
-    has the gaps on each task. Numeric values are drawn to scale, on a logarithmic axis if they span
-    at least a factor of ten. The result is None if no values can be compared.
+    A panel shows the means of table ``parameters``. If several parameters vary, a panel also shows
+    the gaps at the best values of the other parameters. If only one parameter varies, the panel
+    also shows the gaps on each task. Numeric values are drawn to scale, on a logarithmic axis if
+    they span at least a factor of ten. The result is None if no values can be compared.
     """
     rows, tasks, values = list_parameters(study), ranked_tasks(study), values_of_parameters(study)
     if not len(rows):
@@ -157,8 +157,8 @@ def _draw_parameters(study: Study) -> Parts | None:
 def _places_of(values: Sequence[Any]) -> tuple[np.ndarray[Any, Any], bool]:
     """Return the positions of a parameter's values on an axis, and whether it is logarithmic.
 
-    Numbers are at their values, if these are so far apart that the labels do not overlap. Any other
-    values are spaced evenly. The positions have shape ``(values,)``.
+    Numeric values are placed to scale, if they are so far apart that the labels do not overlap. All
+    other values are spaced evenly. The positions have shape ``(values,)``.
     """
     places = np.arange(len(values), dtype=np.float64)
     if not are_numbers(values):
@@ -174,7 +174,8 @@ def _places_of(values: Sequence[Any]) -> tuple[np.ndarray[Any, Any], bool]:
 def _name_lines(axes: Axes, x: float, ends: Mapping[str, float]) -> None:
     """Write the names of lines to the right of their ends, without overlap.
 
-    All lines end at ``x``. ``ends`` maps the name of each line to its y coordinate there.
+    All lines end at the same x coordinate, ``x``. ``ends`` maps the name of each line to the y
+    coordinate at its end.
     """
     low, high = axes.get_ylim()
     least, last = 0.075 * (high - min(low, 0.0)), -math.inf
@@ -189,11 +190,11 @@ _FEW: Any = {"markersize": 3, "alpha": 0.6}
 
 
 def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
-    """Return the gaps of a method's runs if they are too few for an interval.
+    """Return the gaps of a method's runs if there are too few runs for an interval.
 
-    Gaps are in per cent. ``row`` is the method's row of :func:`.standings`. Each gap is the mean
-    over tasks of the runs with the same number. The list is empty if there are enough runs for an
-    interval, or only one run on a task.
+    Gaps are in per cent. ``row`` is the method's row of :func:`.standings`. Each gap is the mean,
+    over tasks, of the gaps of the runs with the same number. The list is empty if there are enough
+    runs for an interval, or if a task has only one run.
     """
     runs = runs_on(study, str(row["method"]), ranked_tasks(study))
     gaps = 100 * runs.groupby("run").gap.mean()
@@ -303,8 +304,9 @@ def draw_saved(study: Study) -> Parts | None:
       as a formula;
     - methods from files.
 
-    All panels have the same order: first the methods that were run on the most tasks, and among
-    these the methods with the smallest mean gap. The result is None if there is nothing to draw.
+    The rows of all panels are in the same order: methods that were run on more tasks come first;
+    methods that were run on equally many tasks are in ascending order of the mean gap. The result
+    is None if there is nothing to draw.
     """
     rows, methods = list_saved(study), study.methods
     single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
@@ -376,8 +378,9 @@ def draw_saved(study: Study) -> Parts | None:
 def draw_postures(study: Study) -> Parts | None:
     """Draw the postures of a method at a goal that two tasks share (:func:`.shared_goal`).
 
-    If the study has random search that is the control of the method, the postures of random search
-    have a second panel. The result is None if there is no shared goal.
+    If the study contains runs of random search that control the method
+    (:func:`.contexts_of_control`), a second panel shows the postures of random search. The result
+    is None if there is no shared goal.
     """
     shared = shared_goal(study)
     if shared is None:
@@ -430,8 +433,8 @@ def draw_shared_goal(study: Study) -> Parts | None:
 
     The goal is that of :func:`.shared_goal`. The four panels show the posture difference, the lean,
     the lean of the base alone, and the lean of the joints alone. A vertical line shows the value of
-    random search, if the study has it. Settings and ablations of methods that are drawn are left
-    out. The result is None if there is no shared goal.
+    random search, if the study contains runs of random search. Settings and ablations of methods
+    that are drawn are left out. The result is None if there is no shared goal.
     """
     shared = shared_goal(study)
     if shared is None:
@@ -471,9 +474,9 @@ def draw_shared_goal(study: Study) -> Parts | None:
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
     """Draw the postures of runs at a shared goal, and their mean on each task.
 
-    The result is a list with a frame for each task. A frame has a row for each run: ``task``,
-    ``method``, ``goal``, ``hand``, and a column for each coordinate of the posture (length units
-    and rad).
+    The result is a list with a frame for each task. A frame contains a row for each run, with
+    columns ``task``, ``method``, ``goal`` and ``hand``, and a column for each coordinate of the
+    posture (length units and rad).
     """
     axes.set_axis_off()
     axes.set_aspect("equal")
@@ -535,12 +538,12 @@ PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluati
 def draw_runtimes(study: Study) -> Parts | None:
     """Draw the share of targets that methods reach within a budget.
 
-    Curves are ECDFs of running times (:func:`.runtimes`). One panel has numbers of trials as
-    budgets, and the other panel has numbers of forward-kinematics evaluations. A panel without a
+    Curves are ECDFs of running times (:func:`.runtimes`). In one panel, the budgets are numbers of
+    trials; in the other, they are numbers of forward-kinematics evaluations. A panel without a
     curve is left out. The result is None if there is no curve.
 
-    Among the methods that represent their algorithms (:func:`.headline_methods`), except the
-    corrective process alone, these have a curve:
+    Curves are drawn for the following methods among those that represent their algorithms
+    (:func:`.headline_methods`), without the corrective process alone:
 
     - all methods that use the reward of each trial;
     - all methods from files;
@@ -703,15 +706,15 @@ def draw_learning_curves(study: Study) -> Parts | None:
 def learning_curves(study: Study) -> pd.DataFrame:
     """Return the learning curve of each method on each individual task, as means over runs.
 
-    A learning curve is the best reward so far as a function of the number of trials. Only solved
-    runs whose rewards of trials are stored count. The methods are the :func:`.headline_methods`
-    among :data:`CURVES` and methods from files. EC1 has a curve only on tasks on which EC2, EC3 and
-    EC4 have none of these runs.
+    A learning curve is the best reward so far as a function of the number of trials. A run is used
+    only if it is solved and the rewards of its trials are stored. A method has a curve if it is one
+    of the methods in :data:`CURVES` or comes from a file, and if :func:`.headline_methods` keeps it
+    among these methods. EC1 has no curve on tasks on which such runs of EC2, EC3 or EC4 exist.
 
     Returns
     -------
     DataFrame
-        If there are no curves, it is empty and has no columns. Otherwise its columns are
+        If there are no curves, the frame is empty and has no columns. Otherwise the columns are
 
         - ``task``, ``method`` (label), and ``runs`` (number of runs);
         - ``trial``: number of trials. There are at most 100 numbers, logarithmically spaced from 1
@@ -737,12 +740,14 @@ def learning_curves(study: Study) -> pd.DataFrame:
 def practice_curves(study: Study) -> pd.DataFrame:
     """Return the mean reward of trials in each tenth of practice, in a noisy world.
 
-    Methods and tasks are chosen as in :func:`learning_curves`. Failed trials do not count.
+    Methods and tasks are chosen as in :func:`learning_curves`, except that a run is used if it is
+    solved and its entry in column ``practice`` of :attr:`.Study.runs` is not missing. Failed trials
+    are left out of means.
 
     Returns
     -------
     DataFrame
-        If there are no curves, it is empty and has no columns. Otherwise its columns are
+        If there are no curves, the frame is empty and has no columns. Otherwise the columns are
 
         - ``task``, ``method`` (label), and ``runs`` (number of runs);
         - ``trial``: number of the trial in the middle of each tenth, for the shortest run;
@@ -766,7 +771,8 @@ def _runs_with_curves(
 ) -> Iterator[tuple[str, str, pd.DataFrame]]:
     """Yield the task, the method's label, and the solved runs of each learning curve.
 
-    Only runs whose ids are in ``run_ids`` count (:func:`learning_curves`).
+    Only runs whose ids are in ``run_ids`` are used. :func:`learning_curves` says which methods have
+    a curve.
     """
     cells = {
         (task, label): runs
@@ -930,8 +936,8 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
 def _draw_order(axes: Axes, goals: Array, apart: float) -> None:
     """Draw goals as numbered discs, and an arrow from each goal to the next.
 
-    ``goals`` has the centres of the goals in length units, shape ``(G, 2)``. Discs whose distance
-    would be below ``apart``, in length units, are moved away from each other.
+    ``goals`` contains the centres of the goals in length units, shape ``(G, 2)``. Discs that would
+    be closer together than ``apart``, in length units, are moved away from each other.
     """
     places = goals.copy()
     for _ in range(100):

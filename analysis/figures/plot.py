@@ -171,8 +171,8 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
 def looks_by_kind(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     """Return the looks of methods in figures with a row for each method, by label.
 
-    Colour and marker say which use of the reward a method makes (:data:`.KINDS`). Methods from a
-    user's method file keep the looks of :func:`looks_in`.
+    Colour and marker say how a method uses the reward (:data:`.KINDS`). Methods from a user's
+    method file keep the looks of :func:`looks_in`.
     """
     looks = looks_in(study, labels)
     for label, look in looks.items():
@@ -202,8 +202,8 @@ def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -
 
     The name is the title of the method, or its short title in a narrow figure. It is broken into
     lines of at most ``longest`` characters, or 24 characters in a narrow figure. In a study that
-    varies parameters, the name has only the values of the parameters, because all settings are of
-    the same method.
+    varies parameters, the name consists of the values of the parameters, because all settings
+    belong to the same method; for the default setting, :func:`.default_name` follows.
     """
     if method in study.varied.index:
         row = study.methods.loc[method]
@@ -362,7 +362,7 @@ def panels_for_page(plot: Plot) -> list[str]:
 
     The elements refer to parts of the element that :func:`for_page` returns. Call that function
     first, and put its element on the same page. The list is empty if the figure has only one panel,
-    or if a panel does not show the names of its rows.
+    or if a panel with axes has no labels on its y axis, because it shares those of another panel.
     """
     drawing, canvas = plot.figure, plot.figure.canvas
     panels = [axes for axes in drawing.axes if axes.has_data()]

@@ -70,7 +70,8 @@ def look_of(method: str) -> Look:
     Parameters
     ----------
     method : str
-        Id of a built-in method that represents its algorithm, such as ``"cma-es/bandit"``.
+        Id of a built-in method, such as ``"cma-es/bandit"``. Of the methods that share an
+        algorithm, only the one that figures show for this algorithm has a look.
 
     Returns
     -------
@@ -80,7 +81,7 @@ def look_of(method: str) -> Look:
     Raises
     ------
     KeyError
-        ``method`` is another id.
+        The method has no look.
 
     Examples
     --------
@@ -221,14 +222,14 @@ def means(
         Axes to draw on.
     frame : DataFrame
         A row for each mean, such as the table of :func:`coartic.analysis.means`. Intervals are
-        drawn if the frame has the ends of the interval of column ``y`` in columns whose names end
-        in ``_low`` and ``_high``.
+        drawn if the ends of the intervals of column ``y`` are in columns whose names are ``y`` with
+        the endings ``_low`` and ``_high``.
     x, y : str
         Names of the columns with the x coordinates and with the means.
     by : str
-        Name of the column that says to which group a row belongs. Each group has a line, a colour
-        and a label; a row with NaN in this column is not drawn. If it is empty, all rows belong to
-        one line.
+        Name of the column that says to which group a row belongs. Each group is drawn as a line
+        with a colour and a label of its own; a row with NaN in this column is not drawn. If ``by``
+        is empty, all rows belong to one line.
     scale : float
         Factor by which means and intervals are multiplied: 100 turns a fraction into per cent.
     shift : float
@@ -323,7 +324,7 @@ def tip(artist: Artist, text: str) -> None:
 def legend_line(label: str, **line: Any) -> Line2D:
     """Return an entry for a legend: a line or marker with its label.
 
-    ``line`` has the look: arguments of Matplotlib's ``Line2D``.
+    ``line`` are arguments of Matplotlib's ``Line2D``, which set the look of the entry.
     """
     return Line2D([], [], label=label, **line)
 

@@ -92,7 +92,8 @@ def write_report(
         - ``folder`` contains the results themselves.
         - ``folder`` already has a report of other results. (If ``folder`` is inside the results
           folder, this is not checked.)
-        - ``folder`` has a file that coartic did not write, under the name of a file of the report.
+        - ``folder`` contains a file that has the name of a file of the report, but was not written
+          by coartic.
     """
     if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(
@@ -182,8 +183,8 @@ def _rows_shown(study: Study, table: Table) -> pd.DataFrame:
 def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str, Any]:
     """Return a dict of the values of a section that the page's template needs.
 
-    ``first`` has the figures at the top of the page, which the section does not repeat. The keys of
-    the dict are
+    ``first`` contains the figures at the top of the page, which the section does not repeat. The
+    keys of the dict are
 
     - ``finding``: the finding as a list of lines;
     - ``first_lines``: how many of these lines the page shows on its first screen;
@@ -259,9 +260,9 @@ def _sections_shown(
 ) -> list[dict[str, Any]]:
     """Return a dict for each section of a world, for the page's template.
 
-    Sections without figures, tables and errors are left out. ``first`` has the figures at the top
-    of the page (:func:`_parts_of`). If a section cannot be made, its title and the error are added
-    to ``failures``. ``watch`` is called with the title of each section before it is made.
+    Sections without figures, tables and errors are left out. ``first`` contains the figures at the
+    top of the page (:func:`_parts_of`). If a section cannot be made, its title and the error are
+    added to ``failures``. ``watch`` is called with the title of each section before it is made.
     """
     shown = []
     for section in of_page:

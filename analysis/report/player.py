@@ -86,8 +86,9 @@ def player(study: Study) -> str:
 def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
     """Yield the table cells that show a gap on a task, with their runs.
 
-    Each item has the id of the HTML cell, the name of the task, and the label of the method. The
-    cells are those of the table of ranked methods and of the table of methods that are not ranked.
+    Each item consists of the id of the HTML cell, the name of the task, and the label of the
+    method. The cells are those of the table of ranked methods and of the table of methods that are
+    not ranked.
     """
     by_method = runs_by_method(study)
     for table in (list_ranking, list_not_ranked):
@@ -135,8 +136,8 @@ def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
     - ``movements``: a dict for each movement, with ``goal`` (from 0), ``hand`` (index in HANDS),
       ``kind`` and ``target`` (length units and rad).
 
-    It is empty if the cell has no solved run, or if a movement of one of these runs is of kind
-    ``path``.
+    The dict is empty if the cell has no solved run, or if a movement of one of the first 500 solved
+    runs is of kind ``path``.
     """
     cell = study.cells.get(key)
     if cell is None or not len(good := solved(cell)[:MAX_EXECUTED]):

@@ -351,9 +351,9 @@ def finding(study: Study, section: Section) -> list[str]:
     """Return the finding of a section in words, as a list of lines.
 
     The lines are made from the tables of the section by its template :attr:`Section.sentence`. For
-    the ranking of a study that varies parameters, they are those of
-    :func:`.answer_on_parameters`. The list is empty if the section has no template, or if its first
-    table has no rows; if this table is the ranking, a line says that no method is ranked.
+    the ranking of a study that varies parameters, the lines are those of
+    :func:`.answer_on_parameters` instead. The list is empty if the section has no template, or if
+    its first table has no rows; if this table is the ranking, a line says that no method is ranked.
     """
     is_ranking = section.tables[0] is list_ranking
     if not section.sentence or not len(section.tables[0](study)):
@@ -406,8 +406,8 @@ def _template_of(sentence: str) -> Template:
 def _beside(row: Mapping[str, Any], is_first: bool) -> str:
     """Return in words how much better or worse than another method a method is.
 
-    ``row`` is a row of table ``differences``. The result is such as ``5.0 [4.2, 5.9] points behind
-    CMA-ES``. If several results are listed, only the first (``is_first``) names the unit.
+    ``row`` is a row of table ``differences``. An example of a result is ``5.0 [4.2, 5.9] points
+    behind CMA-ES``. If several results are listed, only the first (``is_first``) names the unit.
     """
     other = str(row["subject"]).removesuffix(",")
     if row["difference"] == 0:
@@ -453,7 +453,7 @@ def limits(study: Study) -> dict[str, Any]:
     - ``own``: titles of the individual tasks whose best known reward is known only from this
       folder;
     - ``unknown``: titles of the individual tasks without a best known reward;
-    - ``trials``: numbers of trials of the learner, except the paper's number;
+    - ``trials``: numbers of trials of the learner that differ from the paper's number;
     - ``few``: smallest number of runs of the paper's learner on a task, if it is below the paper's
       number of runs;
     - ``seed``: seed of the suite;

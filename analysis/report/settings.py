@@ -46,7 +46,8 @@ def answer_on_parameters(study: Study) -> list[str]:
           the best setting.
         - For each parameter, a line on how much its values change the gap
           (:func:`.list_parameters`).
-        - A line on how many settings are worse than the corrective process alone, if any is.
+        - A line on how many settings are worse than the corrective process alone, if there are such
+          settings.
 
         The list is empty if no setting is ranked.
     """

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have, and functions that parse their values."""
+"""Arguments and options that several commands share, and functions that parse values."""
 
 from __future__ import annotations
 
@@ -101,8 +101,8 @@ def parse_run_range(text: str) -> Any:
 def split_names(texts: Sequence[str] | None) -> list[str]:
     """Split the values of an option at commas, and strip blanks.
 
-    ``texts`` has a string for each time that the option is given, or is None if it is not given.
-    For None the result is an empty list.
+    ``texts`` contains a string for each time that the option is given, or is None if the option is
+    not given. For None the result is an empty list.
 
     Examples
     --------

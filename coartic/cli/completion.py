@@ -46,7 +46,8 @@ def families(incomplete: str = "") -> list[str]:
 def methods(incomplete: str = "") -> list[str]:
     """Return names of the built-in methods: ids, exploration conditions and titles.
 
-    Titles with a blank are left out.
+    Condition ``custom`` and titles with a blank are left out. ``incomplete``, what the user has
+    typed so far, is ignored: Typer itself selects the names that begin with it.
     """
     from coartic.method import built_in_methods
 
@@ -77,7 +78,7 @@ def after_commas(words: Words) -> Words:
 def runs(ctx: typer.Context, incomplete: str) -> list[str]:
     """Return the ids of stored runs that begin with the incomplete word.
 
-    The runs are those of the results folder that the command line names.
+    The runs are those of the results folder that is named on the command line.
     """
     from coartic.runs.store import open_store
 

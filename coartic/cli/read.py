@@ -93,8 +93,8 @@ def report(
 def say_ranking(study: Study, folder: Path) -> None:
     """Print the ranking of each world, and the command for a report.
 
-    Each ranking has the name of its world as a heading, unless the paper's world is the only one.
-    ``folder`` is the results folder of the study.
+    The name of the world is the heading of each ranking, unless the folder contains only the
+    paper's world. ``folder`` is the results folder of the study.
     """
     from coartic.analysis.words import capital
     from coartic.runs.plan import world_title
@@ -209,8 +209,8 @@ def verify(
 ) -> None:
     """Check stored runs by executing their solutions again.
 
-    Exits with code 1 if a result differs, or if the folder lacks runs. With --run only these runs
-    are performed again, and nothing else is checked.
+    Exits with code 1 if a result differs, or if the folder lacks runs. With --run, only the runs
+    that it names are performed again, and nothing else is checked.
     """
     from coartic.analysis.verify import check_runs
     from coartic.benchmarks.reproduce import execute_with_noise_again

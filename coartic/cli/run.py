@@ -362,8 +362,8 @@ def check(
 def _show_results(name: str, results: Sequence[CheckResult]) -> int:
     """Print the results of checks, and return the number of checks that did not pass.
 
-    ``name`` is the name of the method or file that was checked. Checks that were not made count as
-    checks that did not pass.
+    ``name`` is the name of the method or file that was checked. A check that was not made is
+    counted as a check that did not pass.
     """
     words = {True: "pass", False: "FAIL", None: "skip"}
     for result in results:

@@ -171,7 +171,7 @@ class Display:
         self._show(lambda: doing)
 
     def line(self, *texts: str) -> None:
-        """Print lines that stay; on a terminal they stand above the line that changes."""
+        """Print lines that stay; on a terminal they stand above the line that is updated."""
         for text in texts:
             say(text, stream=sys.stderr)
 
@@ -184,8 +184,8 @@ class Display:
     def update(self, progress: Progress, cell: Cell | None) -> None:
         """Show the progress of runs, as argument ``watch`` of :func:`coartic.benchmarks.perform`.
 
-        Before the first run, when ``cell`` is None, it prints which runs the folder has already. If
-        the folder has all runs of the plan, no progress is shown.
+        Before the first run, when ``cell`` is None, this function prints how many runs are stored
+        in the folder already. If all runs of the plan are stored, no progress is shown.
         """
         if cell is None:
             self._say_present(progress)

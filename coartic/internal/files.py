@@ -34,10 +34,9 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files into a folder, and remove files that an earlier call wrote there.
+    """Write files into a folder, and remove files of an earlier call that are not in ``files``.
 
-    Files of an earlier call that are not in ``files`` are removed. Files that coartic did not write
-    are never changed.
+    Files that coartic did not write are never changed.
 
     Parameters
     ----------
@@ -49,8 +48,8 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
     Raises
     ------
     CoarticError
-        Writing fails, or the folder cannot be used (:func:`make_folder`). In the second case no
-        file is written.
+        Writing fails, or the folder cannot be used (:func:`make_folder`). If the folder cannot be
+        used, no file is written.
     """
     old_files = make_folder(folder, files)
 
@@ -139,7 +138,7 @@ def write_output(path: Path, data: bytes, *, replace: bool) -> None:
 def check_ending(path: Path, endings: Collection[str]) -> None:
     """Raise CoarticError if the suffix of a path is not one of ``endings``.
 
-    Upper and lower case of the suffix count as equal; ``endings`` are in lower case.
+    Upper and lower case of the suffix are treated as equal; ``endings`` are in lower case.
     """
     if path.suffix.lower() not in endings:
         *others, last = endings
@@ -167,7 +166,7 @@ def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
     """Convert the name of a file or folder, which need not exist, to a path.
 
     Raises CoarticError if the name is empty or blank. The error message begins with ``what``, which
-    says whose name it is.
+    says what the name stands for.
     """
     if not str(name).strip():
         raise CoarticError(f"{what} is empty; for the current folder write a dot")

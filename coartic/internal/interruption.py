@@ -81,7 +81,8 @@ def end_if_interrupted() -> None:
 def blocked_signals() -> Iterator[None]:
     """Block the signals :data:`ENDING` in a ``with`` block.
 
-    They are blocked in this thread, and in the processes that the thread starts in the block.
+    The signals are blocked in this thread, and in the processes that the thread starts in the
+    block.
     """
     old_mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
     try:

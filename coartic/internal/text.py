@@ -82,8 +82,9 @@ def pluralize(count: int, thing: str) -> str:
 def did_you_mean(name: str, names: Iterable[str]) -> str:
     """Return a hint with the known name that is most similar to a misspelt one.
 
-    The hint, such as ``; did you mean 'a'?``, has the entry of ``names`` that is most similar to
-    ``name``, where upper and lower case count as equal. It is empty if no entry is similar.
+    The hint, such as ``; did you mean 'a'?``, contains the entry of ``names`` that is most similar
+    to ``name``; upper and lower case are treated as equal. The hint is empty if no entry is
+    similar.
     """
     by_lower_case = {known.lower(): known for known in names}
     nearest = difflib.get_close_matches(name.lower(), by_lower_case, 1)
@@ -100,10 +101,10 @@ FOREIGN = (
 
 
 def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto/task.md") -> str:
-    """Return an error message if a file has the format of another program.
+    """Return an error message if a file is in the format of another program.
 
     The format is recognised by the suffix of the name (:data:`FOREIGN`). The message ends with
-    ``wanted``, which says what coartic reads instead. For any other file it is empty.
+    ``wanted``, which says what coartic reads instead. For any other file the message is empty.
     """
     if not path.lower().endswith(FOREIGN):
         return ""
@@ -126,14 +127,14 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     Returns
     -------
     str
-        The message suggests the known name that is most similar. If no known name is similar, it
-        lists the first 12. If ``name`` is the name of a file of another program, such as
-        ``arm.urdf``, the message is that of :func:`foreign_file`.
+        The message suggests the known name that is most similar. If no known name is similar, the
+        message lists the first 12 known names. If ``name`` is the name of a file of another
+        program, such as ``arm.urdf``, the message is that of :func:`foreign_file`.
 
     Examples
     --------
     >>> unknown("task", "ascendin", ["ascending", "descending"])
-    "unknown task 'ascendin'; did you mean 'ascending'?"
+    "task 'ascendin' is unknown; did you mean 'ascending'?"
     """
     if isinstance(name, str) and (sentence := foreign_file(name)):
         return f"{sentence}."

@@ -64,7 +64,7 @@ def threads_for(jobs: int) -> int:
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
     """Call a function with slices of a range of indices, in parallel threads.
 
-    The slices cover ``range(count)``. Their number is at most the environment variable
+    The slices cover ``range(count)``. The number of slices is at most the environment variable
     ``OMP_NUM_THREADS`` or, if that is not set to a number, the number of cores that the process may
     use. The function returns when all calls have ended. An error of a call is raised.
 
@@ -92,8 +92,8 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
     """Set environment variables for the processes that are started in a ``with`` block.
 
-    At the end of the block the variables get their earlier values. If several threads call this
-    function, one block is executed after the other.
+    At the end of the block, the earlier values of the variables are restored. If several threads
+    call this function, one block is executed after the other.
     """
     with _environment_lock:
         old_values = {name: os.environ[name] for name in variables if name in os.environ}
@@ -136,9 +136,9 @@ def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
 def _let_forks_end() -> None:
     """Let SIGTERM end the processes that this process forks.
 
-    Such processes are those of a pool of a method, for example. They inherit the signal handler of
-    the worker. So SIGTERM is blocked until a forked process has set the default handler; otherwise
-    a signal that arrives before that would not end the process.
+    Such processes are, for example, those of a pool that a method makes. They inherit the signal
+    handler of the worker. So SIGTERM is blocked until a forked process has set the default handler;
+    otherwise a signal that arrives before that would not end the process.
     """
 
     def mask(how: int) -> None:

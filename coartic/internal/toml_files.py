@@ -1,4 +1,4 @@
-"""Read files, with error messages that name the file."""
+"""Read files, with error messages that begin with the name of the file."""
 
 from __future__ import annotations
 

@@ -52,8 +52,8 @@ def import_from(folder: Path) -> None:
       because its subfolders have common names, such as ``analysis`` and ``tests``.
     - *Bytecode.* Modules of the user are compiled from their source, and no bytecode of them is
       stored. Python would use stored bytecode if the size and the time stamp of the source are
-      unchanged. But a changed file from an archive, or a copy that keeps the time stamp, can have
-      the same size and time stamp.
+      unchanged. But the size and the time stamp can also be unchanged if a changed file comes from
+      an archive, or is a copy that keeps the time stamp.
     """
     sys.path.insert(0, str(folder))
     root = Path(coartic.__file__).parents[1]

@@ -42,8 +42,8 @@ def describe_validation_errors(kind: type[T]) -> type[T]:
 def equal_contents(a: Any, b: Any) -> Any:
     """Compare two objects field by field, as ``__eq__`` of classes with arrays.
 
-    Two arrays are equal if their shapes and entries are equal. NaN counts as equal to NaN and to a
-    masked entry. The result is NotImplemented if the objects have different classes.
+    Two arrays are equal if their shapes and entries are equal. NaN is treated as equal to NaN and
+    to a masked entry. The result is NotImplemented if the objects have different classes.
     """
     import numpy as np
 
@@ -117,5 +117,8 @@ def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool =
 
 
 def described_error(text: str) -> PydanticCustomError:
-    """Return a validation error whose message is ``text``, without key and value."""
+    """Return a validation error whose message is only ``text``.
+
+    The message does not name the field that is wrong, or its value.
+    """
     return PydanticCustomError("sentence", "{text}", {"text": text})

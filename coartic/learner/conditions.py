@@ -89,10 +89,10 @@ Drifts = Annotated[
 class ExplorationCondition:
     """Rules of the learner's exploration and learning (paper, section *Experiments*).
 
-    ``CONDITIONS`` has the paper's four conditions, ``ABLATIONS`` has conditions that change one
-    part of the learner, and ``INFORMED`` has conditions that use more information. To change fields
-    of a condition, use ``dataclasses.replace``. Raises ValueError if a field is out of range, or if
-    two fields contradict each other.
+    ``CONDITIONS`` contains the paper's four conditions, ``ABLATIONS`` contains conditions that
+    change one part of the learner, and ``INFORMED`` contains conditions that use more information.
+    To change fields of a condition, use ``dataclasses.replace``. Raises ValueError if a field is
+    out of range, or if two fields contradict each other.
 
     Examples
     --------

@@ -5,11 +5,11 @@ trial, the learner chooses a hand, perturbs the target configuration that is sto
 and moves to it. If the hand misses the goal, the corrective process **A** moves it into the goal
 (:mod:`coartic.motion.kernels.trial`).
 
-The learner has a table keyed by state (the goal and the previous hand) and hand. An entry is the
+The learner stores a table keyed by state (the goal and the previous hand) and hand. An entry is the
 value Q and the target q*. A completed trial is compared, in each state that it passed through, with
 all earlier trials that chose the same hand in this state: by the total reward or, in an ablation,
-by the return of the goal. If it is better than all of them, its value and its configuration at the
-goal replace Q and q* in the table.
+by the return of the goal. If the trial is better than all of these earlier trials, its reward (or
+return) and its configuration at the goal replace Q and q* in the table.
 
 One call of a compiled kernel by :mod:`coartic.learner.learning` makes many runs side by side: the
 outer loop is over trials, then over goals, then over runs. Each run draws random numbers from its
@@ -179,8 +179,8 @@ def learner_parameters(
 ) -> LearnerParameters:
     """Convert a task and an exploration condition to the form that the learner's kernel reads.
 
-    ``initial`` has the movement for each goal in trial 0. If a movement has no target, only the
-    corrective process acts at this goal.
+    ``initial`` contains the movement for each goal in trial 0. If a movement has no target, only
+    the corrective process acts at this goal.
     """
     task, width = compiled.task, width_of(compiled.task.robot)
     first_targets = np.full((len(initial), width), np.nan)
@@ -286,7 +286,7 @@ def _nearest_posture(
 def _best_hand(entries: Any, hands: Any) -> int:
     """Return the hand among ``hands`` with the highest Q; at a tie the first.
 
-    ``entries`` has a record for each hand, 0 left and 1 right.
+    ``entries`` contains a record for each hand, 0 left and 1 right.
     """
     best = hands[0]
     for hand in hands[1:]:
@@ -335,8 +335,8 @@ def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) 
     - *stay*: the present posture q;
     - *start*: the posture at the start of the trial;
     - *next goal*: (q + t') / 2. Here t' is the target that is stored for the next goal and for the
-      hand with the highest value there. If there is no next goal or no stored target, p is q. In
-      the joints that are not explored with that hand, p is q as well.
+      hand with the highest value Q at the next goal. If there is no next goal or no stored target,
+      p is q. In the joints that are not explored with that hand, p is q as well.
 
     ``number`` is the index of the goal, from 0. ``table`` is an array of records with the fields
     ``value`` and ``target``, shape ``(G, 3, 2)``; its axes are goal, previous hand (0 left, 1
@@ -445,9 +445,9 @@ def make_trial(
     """Make trial number ``trial``, from 0, in each of N runs.
 
     A trial ends at the first goal that is missed. This function fills the per-goal records
-    ``records``, shape ``(N, G)``, and the counts in ``workspace``. Trial 0 has
-    the hands and targets of ``learner``. If ``explore`` is False, the trial is greedy, without
-    drift and noise of exploration. Other arguments are as in :func:`learn_kernel`.
+    ``records``, shape ``(N, G)``, and the counts in ``workspace``. In trial 0, the hands and
+    targets are those in ``learner``. If ``explore`` is False, the trial is greedy, without drift
+    and noise of exploration. Other arguments are as in :func:`learn_kernel`.
     """
     batch, counts, runs, initial = workspace.batch, workspace.counts, len(tables), trial == 0
     for n in range(runs):
@@ -490,7 +490,8 @@ def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
     """Compute the return of each goal of a completed trial, in place.
 
     ``returns``, shape ``(G,)``, becomes Σ γ^|h − g| r_h for each goal g, where r_h is minus the
-    ticks of goal h. The sum is over goals h from g on, or over all goals if earlier goals count.
+    ticks of goal h. The sum is over goals h from g on, or over all goals if the condition includes
+    earlier goals.
     """
     earlier, later = 0.0, 0.0
     for number in range(len(trial)):
@@ -522,8 +523,8 @@ def _learn_from(
 
     ``number`` is the number of the trial, from 0. For each state that a completed trial passed
     through and the hand that it chose there, the reward of the trial (or the return of the goal) is
-    compared with Q. If it is higher, it replaces Q in ``tables``, and the configuration at the hit
-    replaces q*.
+    compared with Q. If the reward is higher, it replaces Q in ``tables``, and the configuration at
+    the hit replaces q*.
     """
     later_trials = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // later_trials
@@ -561,7 +562,8 @@ def learn_kernel(
 ) -> None:
     """Make all trials of N runs, then the replay of each run.
 
-    The replay is a greedy trial without noise. If there are 0 trials, trial 0 takes its place.
+    The replay is a greedy trial without exploration noise. If there are 0 trials, trial 0 takes the
+    place of the replay.
 
     Parameters
     ----------
@@ -576,8 +578,8 @@ def learn_kernel(
     rngs
         The runs' own generators (:func:`addresses`).
     seeds
-        Seed of the motor noise of each run (:func:`.noise_seed`), shape ``(N,)``. Trial k has noise
-        draw k. The replay has the draw after that of the last trial.
+        Seed of the motor noise of each run (:func:`.noise_seed`), shape ``(N,)``. Trial k is made
+        with noise draw k. The replay is made with the draw after that of the last trial.
     workspace
         From :func:`workspace_for`.
     """

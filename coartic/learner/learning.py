@@ -56,8 +56,7 @@ _MAX_BATCH_TRIALS = 4_000_000  # trials of runs whose rewards fit into one answe
 def runs_at_once(trials: int) -> int:
     """Return how many runs of ``trials`` trials a job of a worker has at most.
 
-    The runs of a job together make at most 4,000,000 trials. The number is at least 1 and at most
-    72.
+    The number is from 1 to 72. A job of more than one run makes at most 4,000,000 trials in all.
 
     Examples
     --------
@@ -92,10 +91,11 @@ def learn(
         Number of trials, including trial 0.
     model : MotionModel
     start : sequence of Movement
-        A first solution, such as that of a planner or of an earlier run. In trial 0 the robot
-        moves, for each goal, straight to the target of the first movement of this solution. If the
-        hand misses the goal, or if the movement has no target, the corrective process acts. Without
-        a first solution, only the corrective process acts in trial 0.
+        A first solution, such as that of a planner or of an earlier run. In trial 0 the robot makes
+        a straight movement for each goal, to the target of the first movement that the first
+        solution has for this goal. If the hand misses the goal, or if that movement has no target,
+        the corrective process acts. Without a first solution, only the corrective process acts in
+        trial 0.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def learn(
     CoarticError
         The condition is unknown.
     TypeError
-        ``task``, ``condition`` or ``model`` has another type.
+        ``task``, ``condition`` or ``model`` has a wrong type.
     SolutionError
         The first solution breaks the task's rules.
     ValueError
@@ -154,8 +154,8 @@ def learn_many(
 ) -> list[LearningRun]:
     """Run the learner once for each of many seeds, as :func:`learn` does.
 
-    The runs are made side by side and in threads, which takes less time, but does not change their
-    results.
+    The runs are made side by side and in threads. This takes less time, but does not change the
+    results of the runs.
 
     Parameters
     ----------
@@ -243,9 +243,9 @@ def _learn_together(
 ) -> list[LearningRun]:
     """Run the learner side by side for at most 72 seeds, without checks.
 
-    Return the runs in the order of seeds. ``initial`` has the movement for each goal in trial 0; if
-    a movement has no target, only the corrective process acts at this goal. With ``trials`` 0 the
-    kernels are compiled, the rewards are empty, and the replay is trial 0.
+    Return the runs in the order of seeds. ``initial`` contains the movement for each goal in trial
+    0; if a movement has no target, only the corrective process acts at this goal. With ``trials`` 0
+    the kernels are compiled, the rewards are empty, and the replay is trial 0.
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)

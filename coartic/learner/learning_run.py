@@ -77,12 +77,12 @@ class LearningRun:
 
     @property
     def learned(self) -> tuple[Movement, ...]:
-        """Movements of the learned solution; empty if its trial did not hit every goal.
+        """Movements of the learned solution; empty if there is none.
 
         - Without motor noise, the learned solution is the best trial, or the replay if the
-          condition has ``learned="replay"``.
-        - With motor noise the best trial was partly lucky. So the learned solution is
-          :attr:`next_action`.
+          condition has ``learned="replay"``. It is empty if this trial did not hit every goal.
+        - With motor noise, the best trial is partly luck. So the learned solution is
+          :attr:`next_action`, which was not executed. It is empty only if no trial was completed.
         """
         if self.model.motor_noise > 0.0:
             return self.next_action
@@ -122,7 +122,7 @@ class LearningRun:
 
     @property
     def reason(self) -> str:
-        """Sentence on why the run has no learned solution; empty if it has one."""
+        """Sentence on why the run has no learned solution; empty if there is a learned solution."""
         if self.learned:
             return ""
         if self.best_trial is not None:
@@ -137,8 +137,8 @@ class LearningRun:
         """Total reward of the best trial or of the replay; None without a solution.
 
         It is the reward of the replay if the condition has ``learned="replay"``, and otherwise the
-        highest reward of all trials. With motor noise this single trial was partly lucky: to judge
-        :attr:`learned`, execute it by :func:`coartic.execute_noisy`.
+        highest reward of all trials. With motor noise, the reward of this single trial is partly
+        luck: to judge :attr:`learned`, execute it by :func:`coartic.execute_noisy`.
         """
         if self.condition.learned == "replay":
             return self.replay_reward

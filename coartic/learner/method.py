@@ -105,8 +105,8 @@ class DualProcess(Method):
     def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`.
 
-        The sessions of a call together make at most 4,000,000 trials. The number is at least 1 and
-        at most 72.
+        The number is from 1 to 72. If it is above 1, the sessions of a call together make at most
+        4,000,000 trials.
         """
         return runs_at_once(self.parameters.trials)
 
@@ -157,9 +157,9 @@ class DualProcess(Method):
 def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
     """Make the class of the learner under an exploration condition.
 
-    The class is a subclass of :class:`DualProcess`. Its parameters are ``trials``, ``noise_sd`` and
-    ``epsilon``; for an informed condition ``drift``, ``pull`` and ``direction``, too; and for a
-    condition with credit for subtasks ``discount`` and ``counted``, too.
+    The class is a subclass of :class:`DualProcess`. The parameters are ``trials``, ``noise_sd`` and
+    ``epsilon``. For an informed condition, ``drift``, ``pull`` and ``direction`` are parameters,
+    too. For a condition with credit for subtasks, ``discount`` and ``counted`` are parameters, too.
     """
     names = ["epsilon", "noise_sd"]
     base, _, change = condition.id.partition("-")
@@ -236,7 +236,7 @@ class CustomDualProcess(DualProcess):
     def rules(self) -> ExplorationCondition:
         """Return a copy of condition ``base`` in which the parameters change fields.
 
-        A field whose parameter is None keeps its value. The id of the copy is, for example,
+        A field does not change if its parameter is None. The id of the copy is, for example,
         ``EC4, changed,``.
         """
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")

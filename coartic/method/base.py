@@ -224,9 +224,10 @@ class Method(ABC):
         -------
         Result
             The solution, with at least one movement for each goal, and further data to be stored.
-            With motor noise (``session.model.motor_noise`` above 0) the best trial was partly
-            lucky. The solution then has the movements that the method recommends to make next. They
-            are judged on draws of the noise that the method has not seen.
+            With motor noise (``session.model.motor_noise`` above 0) the reward of the best trial is
+            partly luck. The solution then consists of the movements that the method recommends to
+            make next. These movements are judged on draws of the noise that the method has not
+            seen.
 
         Raises
         ------
@@ -241,7 +242,7 @@ class Method(ABC):
     def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`.
 
-        For methods that do not belong to this project, a suite ignores this number: it always
+        For methods that do not belong to this project, a suite ignores this number, and always
         passes one session at a time, to :meth:`solve`.
         """
         return 1
@@ -334,7 +335,7 @@ def run_method(
     SolutionError
         The solution is not a sequence.
     TaskError, TypeError
-        The task cannot be used, or has another type.
+        The task cannot be used, or has a wrong type.
     ValueError
         The seed is not an integer from 0 to 2^128 - 1.
     """

@@ -80,8 +80,8 @@ def sequences_of(session: Session) -> list[str]:
     """List all hand sequences of the session's task, such as ``"RRLR"``.
 
     The order is alphabetical, except that a hand sequence that the task names comes first. If there
-    are more than 4096 sequences, the list has only the initial hand sequence. It comes from
-    :meth:`Session.find_initial_hands`, whose errors are raised.
+    are more than 4096 sequences, the list contains only the initial hand sequence, which comes from
+    :meth:`Session.find_initial_hands`. The errors of that function are raised.
     """
     if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
         return [session.find_initial_hands()]
@@ -101,13 +101,14 @@ def _entries_of(name: str, points: ArrayLike) -> Array:
 class Objective:
     """The cost of a trial (its ticks) as a function of its target configurations.
 
-    A point has, goal by goal, the targets of the entries of a configuration that are explored
-    (:func:`explored_joints`), in length units (base) and rad (joints).
+    A point is a vector of ``dim`` numbers, in length units (base) and rad (joints). For each goal
+    in turn, it contains the target of each explored entry of a configuration
+    (:func:`explored_joints`).
 
     - The cost of a point is minus the reward of its trial, or ``FAILED`` if the trial fails or
       takes more than ``FAILED`` ticks.
-    - If a movement misses its goal, the corrective process acts, and the ticks of its movement
-      count.
+    - If a movement misses its goal, the corrective process acts. The ticks of the corrective
+      movement are part of the cost.
     - If all entries of a goal are NaN, there is no movement to a target: only the corrective
       process acts. If the hand is in the goal already, this costs no ticks, whereas a movement to a
       target takes at least one tick.
@@ -121,8 +122,8 @@ class Objective:
     up. The best of these sequences becomes :attr:`hands`, the default hand sequence of all points.
 
     Threads can share an objective; their calls are executed one after the other. Copying an
-    objective, or using it in a forked process, raises CoarticError, because the budget would not
-    count those trials.
+    objective, or using it in a forked process, raises CoarticError, because trials of a copy or of
+    another process would not be subtracted from the budget.
 
     Parameters
     ----------
@@ -235,7 +236,7 @@ class Objective:
         """Lowest known cost of a solution of the task (in ticks), or None.
 
         The solution may have any hand sequence, and may hit goals without a movement. With motor
-        noise the cost is a mean. It is None if no such cost is shipped with coartic, as for
+        noise the cost is a mean. The result is None if no such cost is shipped with coartic, as for
 
         - most tasks of your own;
         - instances of families, except the first 40 test instances of shipped families;
@@ -322,9 +323,9 @@ class Objective:
         Returns
         -------
         float or ndarray
-            Number of evaluations until the best cost was at or below each target; infinite if no
-            point has reached the target so far. The result is a float if ``targets`` is a number,
-            otherwise an array of the same shape.
+            Number of evaluations until the best cost was at or below each target. The number is
+            infinite if no point has reached the target so far. The result is a float if ``targets``
+            is a number, otherwise an array of the same shape.
 
         Raises
         ------
@@ -346,8 +347,8 @@ class Objective:
         """A starting point for a search, shape ``(dim,)``, in length units and rad.
 
         The corrective process on its own, with :attr:`hands`, hits the goals in certain
-        configurations; the starting point has the explored entries of these configurations. Each
-        access returns a new array.
+        configurations; the starting point consists of the explored entries of these configurations.
+        Each access returns a new array.
         """
         return self.configurations[self.joints].copy()
 
@@ -386,12 +387,12 @@ class Objective:
         -------
         tuple of Movement
             A movement for each goal. A movement has no target if the entries of its goal are NaN.
-            Otherwise the target has entries for all joints. A joint that the point does not include
-            keeps its value: its entry is
+            Otherwise the target has entries for all joints. The entry of a joint that the point
+            does not include is
 
-            - its value when the movement begins;
-            - its value at the start of the trial, in the targets of goals after a goal at which the
-              trial fails;
+            - the value of the joint when the movement begins;
+            - the value of the joint at the start of the trial, in the targets of goals after a goal
+              at which the trial fails;
             - NaN with motor noise (a joint whose target is NaN does not move).
 
         Raises
@@ -480,15 +481,15 @@ class Objective:
         Parameters
         ----------
         points : array_like, shape (N, dim)
-            Points as rows. Entries are finite, or all NaN for a goal at which only the corrective
-            process is to act. Joints without an entry in a point keep still. A trial with an entry
-            beyond 100,000 fails.
+            Points as rows. Entries are finite. For a goal at which only the corrective process is
+            to act, all entries are NaN. Joints without an entry in a point keep still. A trial with
+            an entry beyond 100,000 fails.
         hands : str or sequence of str, optional
             One hand sequence for all points (``"RRLR"``), or a sequence for each; by default
             :attr:`hands`.
         draws : array_like of int, shape (N,), optional
             Number of the noise draw for each point (:meth:`.Session.trials`). Points with the same
-            draw have the same noise. To choose draws, a method has to declare
+            draw are evaluated with the same noise. To choose draws, a method has to declare
             ``Information.NOISE_DRAWS``.
 
         Returns
@@ -603,8 +604,8 @@ class Objective:
     def _trials_left(self, count: int) -> int:
         """Return how many of ``count`` trials the budget allows.
 
-        Raises BudgetError if ``count`` is above 0 and no trial is left, and CoarticError in
-        another process.
+        Raises BudgetError if ``count`` is above 0 and no trial is left, and CoarticError if the
+        objective was made in another process.
         """
         if os.getpid() != self._process:
             raise CoarticError(NO_COPIES)
@@ -630,14 +631,15 @@ def objective(
     task : Task, str or pathlib.Path
     hands : str, optional
         A hand sequence (``"RRLR"``), by default the sequence for which the corrective process on
-        its own gets the highest reward. The optimum can have other hands, as in ``two-armed-2``.
+        its own gets the highest reward. The optimum can be reached with another hand sequence, as
+        in ``two-armed-2``.
     half_width : float
         Half the width of the bounds around ``x0``, in length units (base) and rad (joints).
     model : MotionModel
         The motion model, such as ``MotionModel(motor_noise=0.01)``.
     budget : int, optional
-        Largest number of trials, including the trials that choose the hand sequence. Further trials
-        raise BudgetError.
+        Largest number of trials, including the trials that choose the hand sequence. When the
+        budget is used up, a further trial raises BudgetError.
     seed : int
         Seed of the motor noise, from 0 to 2^128 - 1.
 
@@ -708,8 +710,8 @@ class Optimiser(Method):
     def solve(self, session: Session) -> Result:
         """Call :meth:`optimise` until it returns or no trial is left; return the best trial.
 
-        With motor noise, return the movements of the point that :meth:`optimise` recommends. If it
-        recommends no point, return the best trial, which was partly lucky.
+        With motor noise, return the movements of the point that :meth:`optimise` recommends. If
+        :meth:`optimise` recommends no point, return the best trial, whose reward is partly luck.
 
         Raises
         ------
@@ -770,8 +772,8 @@ class Optimiser(Method):
             The point that the method recommends, such as the mean of an evolution strategy; or a
             tuple of the point and its hand sequence, if the sequence is not
             :attr:`Objective.hands`. The returned point is the solution only with motor noise,
-            because there the best trial was partly lucky. Without noise, or if None is returned,
-            the best trial is the solution.
+            because there the reward of the best trial is partly luck. Without noise, or if None is
+            returned, the best trial is the solution.
 
         Notes
         -----

@@ -89,7 +89,7 @@ class UndeclaredError(CoarticError):
 
 
 class BudgetError(CoarticError):
-    """More trials were requested than the budget has."""
+    """More trials were requested than are left in the budget."""
 
 
 class MethodError(CoarticError):
@@ -344,10 +344,11 @@ class Session:
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
-        """Check that a solution uses only declared information, and add its use to :attr:`used`.
+        """Check that a solution uses only declared information, and note it in :attr:`used`.
 
         A corrective movement without a target uses the corrective process. Raises UndeclaredError
-        if the method does not declare it, and SolutionError if the solution is not a sequence.
+        if the method does not declare the corrective process, and SolutionError if the solution is
+        not a sequence.
         """
         if not isinstance(solution, Sequence):
             raise SolutionError(f"the solution is {brief_value(solution)}; it must be a list")
@@ -466,8 +467,8 @@ class Session:
         """Make one physical trial of a solution, and count it.
 
         The ticks, evaluations, iterations and corrections of the trial are counted as well. If a
-        goal is missed, the corrective process acts, and its ticks count. With motor noise, trial k
-        has draw k of the noise.
+        goal is missed, the corrective process acts, and the ticks of its movement are part of the
+        reward. With motor noise, trial k is made with draw k of the noise.
 
         Parameters
         ----------
@@ -476,8 +477,8 @@ class Session:
         Returns
         -------
         Execution
-            The execution. If ``Information.CORRECTIVE_PROCESS`` is not declared, its movements are
-            those of ``solution``, and it has no configurations.
+            The execution. If ``Information.CORRECTIVE_PROCESS`` is not declared, the movements of
+            the execution are those of ``solution``, and the execution contains no configurations.
 
         Raises
         ------
@@ -516,33 +517,34 @@ class Session:
     ) -> Trials:
         """Make N physical trials at once.
 
-        If a goal is missed, the corrective process acts, and its ticks count. The counts are the
-        same as for N calls of :meth:`trial`, except that :meth:`trial` makes one or two more
-        evaluations of forward kinematics for each goal that is tried.
+        If a goal is missed, the corrective process acts, and the ticks of its movement are part of
+        the reward. The counts are the same as for N calls of :meth:`trial`, except that
+        :meth:`trial` makes one or two more evaluations of forward kinematics for each goal that is
+        tried.
 
         Parameters
         ----------
         hands : str or sequence of str
             One hand sequence for all trials (``"RRLR"``), or a sequence for each.
         targets : array_like, shape (N, G, dof)
-            Targets, in length units (base) and rad (joints). A joint whose target is NaN keeps its
-            value. If all targets of a goal are NaN, there is no movement to a target: only the
+            Targets, in length units (base) and rad (joints). A joint whose target is NaN does not
+            move. If all targets of a goal are NaN, there is no movement to a target: only the
             corrective process acts, and the method has to declare it. A trial with a target beyond
             ±100,000 fails without a movement (:meth:`trial` raises an error instead).
         until : array_like, shape (N,), optional
-            Threshold of the reward for each trial. The first trial whose reward exceeds its
-            threshold is the last trial that is counted and returned.
+            Threshold of the reward for each trial. The first trial whose reward exceeds the
+            threshold for this trial is the last trial that is counted and returned.
         draws : array_like of int, shape (N,), optional
-            Number of the noise draw for each trial, from 0 to 2^53. Trials with the same draw have
-            the same noise (*common random numbers*). By default trial k of the session has draw k.
-            Without motor noise the draws have no effect.
+            Number of the noise draw for each trial, from 0 to 2^53. Trials with the same draw are
+            made with the same noise (*common random numbers*). By default trial k of the session is
+            made with draw k. Without motor noise the draws have no effect.
 
         Returns
         -------
         Trials
-            The results, with a row for each trial made. If the budget has only n < N trials left,
-            only the first n are made. If ``Information.CORRECTIVE_PROCESS`` is not declared,
-            ``corrections``, ``iterations``, ``targets`` and ``reached`` are empty.
+            The results, with a row for each trial made. If only n < N trials are left in the
+            budget, only the first n trials are made. If ``Information.CORRECTIVE_PROCESS`` is not
+            declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` are empty.
 
         Raises
         ------
@@ -606,7 +608,8 @@ class Session:
         """Return hand sequences as integer codes (0 left, 1 right), shape ``(count, G)``.
 
         ``hands`` is one hand sequence for all trials, or one sequence for each trial. Raises
-        ValueError if ``hands`` does not fit the task, or has another number than ``count``.
+        ValueError if a sequence does not fit the task, or if the number of sequences in a list is
+        not ``count``.
         """
         return hand_codes(self._task, hands, count)
 
@@ -645,9 +648,9 @@ class Session:
     ) -> TrialRecords:
         """Make and count N trials, and return their per-goal records.
 
-        With ``until`` fewer trials may be counted and returned (:meth:`trials`). ``codes`` are the
-        hands, 0 (left) or 1 (right), shape ``(N, G)``. The caller checks arguments and budget, and
-        holds ``lock``.
+        If ``until`` is passed, fewer than N trials may be counted and returned (:meth:`trials`).
+        ``codes`` are the hands, 0 (left) or 1 (right), shape ``(N, G)``. The caller checks
+        arguments and budget, and holds ``lock``.
         """
         worlds = self._worlds(len(targets), draws)
         records = make_trials(self._compiled, codes, targets[:, :, None], worlds=worlds)
@@ -664,15 +667,15 @@ class Session:
         """Find the hand sequence of the first trial, such as ``"RRRR"``.
 
         If the task names a sequence, that sequence is returned. If the task names a policy, the
-        session tries the corrective process on its own with each candidate sequence, and returns
-        the sequence with the highest reward. The candidates are
+        session tries the corrective process on its own with each candidate sequence, without motor
+        noise, and returns the sequence with the highest reward. The candidates are
 
         - ``"best-single-hand"``: the sequences of one hand;
         - ``"best-of-all"``: all sequences.
 
-        The trials of this search are counted as ``initial_trials``: neither the number of trials of
-        the method nor its budget includes them. The ticks and other counts of these trials are
-        added to the counts of the method.
+        The trials of this search are counted as ``initial_trials``: they are included neither in
+        the number of trials of the method nor in its budget. The ticks and other counts of these
+        trials are added to the counts of the method.
 
         Parameters
         ----------
@@ -705,8 +708,8 @@ class Session:
     ) -> None:
         """Add trials to :attr:`rewards` and to the meter.
 
-        ``rewards`` has :data:`NO_REWARD` for each failed trial; all other arguments are sums over
-        the trials. An iteration counts as a Jacobian as well.
+        ``rewards`` contains :data:`NO_REWARD` for each failed trial; all other arguments are sums
+        over the trials. Each iteration is also counted as an evaluation of a Jacobian.
         """
         made, meter = len(self._rewards), self._meter
         self._rewards.frombytes(rewards.tobytes())
@@ -801,7 +804,7 @@ class Session:
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
         """Record trials that a compiled method of this project made outside the session's calls.
 
-        ``rewards`` has an entry for each trial, None for a failed trial. ``solve_s`` (in s) is
+        ``rewards`` contains an entry for each trial, None for a failed trial. ``solve_s`` (in s) is
         added to the counter ``solve_s``. No other counter changes. Raises UndeclaredError if the
         method is not of this project.
         """

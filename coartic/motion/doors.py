@@ -1,8 +1,8 @@
 """Python functions for single movements and corrections, which call the compiled kernels.
 
 A movement is straight in joint space, or follows a path through waypoints. Its length is measured
-in the norm of the motion model, in which a length unit of the base counts as much as
-``base_weight`` rad of a joint.
+in the norm of the motion model, in which a length unit of the base is as long as ``base_weight``
+rad of a joint.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def move(
         - the hand is unknown;
         - a constant of the model is out of bounds, or the model has motor noise.
     TypeError
-        ``robot``, ``model`` or ``stop_on_arrival`` has another type.
+        ``robot``, ``model`` or ``stop_on_arrival`` has a wrong type.
 
     Notes
     -----
@@ -161,7 +161,7 @@ def follow(
         A shape is wrong, the hand is unknown, a number is not finite or out of bounds, or the model
         has motor noise.
     TypeError
-        ``robot`` or ``model`` has another type.
+        ``robot`` or ``model`` has a wrong type.
     """
     batch = one_run(robot, q, hand, goal, radius)
     points = finite_array("waypoints", waypoints, (max(len(waypoints), 1), robot.dof))
@@ -175,9 +175,9 @@ def follow(
 def scale_base(changes: Array, model: MotionModel) -> Array:
     """Multiply the base coordinates of changes of a configuration by the weight of the base.
 
-    ``changes`` and the result have shape ``(..., dof)``. The norm of a row of the result, in the
-    norm of the model, is the length of a straight movement by this change. If the weight is 1,
-    ``changes`` itself is returned.
+    ``changes`` and the result have shape ``(..., dof)``. The length of the straight movement that
+    makes the change in a row of ``changes`` is the norm of the same row of the result. The norm is
+    that of ``model``. If the weight is 1, ``changes`` itself is returned.
     """
     if model.base_weight == 1.0:
         return changes
@@ -201,8 +201,8 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
     Returns
     -------
     ndarray, shape (n + 1, dof)
-        Configurations of a movement of n steps, including both ends. They are equal to those of the
-        kernels, bit for bit.
+        Configurations of a movement of n steps, including both ends. The kernels compute the same
+        configurations, bit for bit.
 
     Examples
     --------
@@ -369,14 +369,14 @@ def correct(
     Returns
     -------
     Correction
-        The configuration, whether its hand is at the goal, and how many iterations the process
-        took. If the process does not converge within ``model.max_iterations``, ``converged`` is
-        False, and no error is raised.
+        The configuration, whether the hand is at the goal in this configuration, and how many
+        iterations the process took. If the process does not converge within
+        ``model.max_iterations``, ``converged`` is False, and no error is raised.
 
     Raises
     ------
     TypeError
-        ``robot`` or ``model`` has another type.
+        ``robot`` or ``model`` has a wrong type.
     ValueError
         An argument cannot be used:
 

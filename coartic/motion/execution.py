@@ -1,9 +1,9 @@
 """Execute solutions: make the movements of a solution, and score them.
 
 A solution is executed from the task's start by the rule of :mod:`coartic.motion.kernels.trial`, and
-each control tick counts. If the movements miss a goal, the corrective process moves the hand into
-the goal. The score of a solution is the reward of this execution; a reward that a method itself
-reports does not count.
+the control ticks of all movements are counted. If the movements miss a goal, the corrective process
+moves the hand into the goal. The score of a solution is the reward of this execution; a reward that
+a method itself reports is ignored.
 
 :func:`execute` executes a solution without noise, :func:`execute_noisy` many times with motor
 noise.
@@ -115,8 +115,9 @@ def execute(
 ) -> Execution:
     """Execute a solution from the task's start, and score it.
 
-    If the movements for a goal miss it, the corrective process starts from the robot's present
-    configuration and makes a corrective movement, whose ticks count.
+    If the movements for a goal miss the goal, the corrective process starts from the robot's
+    present configuration and makes a corrective movement. The ticks of this movement are counted,
+    too.
 
     Parameters
     ----------
@@ -135,12 +136,12 @@ def execute(
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or ``task`` or ``model`` has another type.
+        The task cannot be used, or ``task`` or ``model`` has a wrong type.
     SolutionError
         The solution breaks a rule of the task:
 
         - goals are missing or out of order;
-        - the task does not have a movement's hand;
+        - the hand of a movement is not a hand of the task;
         - a target has the wrong shape or is not finite;
         - a locked base moves by more than 1e-6.
     ValueError
@@ -180,7 +181,7 @@ def execute_many(
     -------
     list
         For each solution, in order, its Execution. For a solution that cannot be executed, the
-        entry is the error that :func:`execute` would raise, which is not raised here.
+        entry is an exception: the one that :func:`execute` would raise. It is not raised here.
     """
     executions: list[Plan | Refused] = []
     for solution in solutions:
@@ -211,9 +212,9 @@ def _with_targets(movements: list[Movement], corrective: float = math.inf) -> li
     """Return the movements for a goal that are made before the corrective process acts.
 
     These are the movements with targets, up to the first movement without a target or, if that
-    comes earlier, up to the corrective movement after ``corrective`` others. If the first movement
-    is corrective, the list begins with None, which stands for a check whether the hand is in the
-    goal already.
+    comes earlier, up to the corrective movement that follows ``corrective`` other movements. If the
+    first movement is corrective, the list begins with None, which stands for a check whether the
+    hand is in the goal already.
     """
     aimed: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:
@@ -438,35 +439,35 @@ def execute_noisy(
         K solutions of the task, as a list even if there is only one.
     motor_noise : float
         Standard deviation s of the noise, from 0 to 100, in length units (base) and rad (joints).
-        With 0 the ticks are the same as in :func:`coartic.execute`.
+        If it is 0, the ticks are the same as in :func:`coartic.execute`.
     repeats : int
         Number R of executions of each solution.
     seed : int or iterable of int
         Seed of the noise, from 0 to 2^128 - 1: one seed for all solutions, or one for each. With
-        one seed, the r-th executions of all solutions have the same noise (*common random
+        one seed, execution number r is made with the same noise for all solutions (*common random
         numbers*). The ticks of a solution depend neither on the other solutions nor on ``repeats``.
     model : MotionModel
-        The motion model of the executions. Its own ``motor_noise`` must be 0.
+        The motion model of the executions. Its constant ``motor_noise`` must be 0.
     signal_dependent : bool
         True if the noise of aimed movements grows with their length. The noise of corrections
-        always does.
+        always grows with their length.
 
     Returns
     -------
     ndarray, shape (K, R)
         Control ticks of each execution; NaN if the execution failed. An execution fails if the
         corrective process does not converge, or if a goal is still missed after 50 corrections. If
-        a solution has failures, report their number as well, because the mean over its other
-        executions is too low.
+        executions of a solution fail, report the number of failures as well, because the mean over
+        all other executions is too low.
 
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or an argument has another type.
+        The task cannot be used, or an argument has a wrong type.
     SolutionError
-        A solution breaks the task's rules, as in :func:`coartic.execute`. Or the ticks stored in
-        its movements differ from the ticks on this task with this model, for example because the
-        solution belongs to another task.
+        A solution breaks the task's rules, as in :func:`coartic.execute`. Or the sum of the ticks
+        stored in its movements differs from the ticks that it takes on this task with this model,
+        for example because the solution belongs to another task.
     ValueError
         ``motor_noise``, ``repeats``, ``seed`` or a constant of the model is out of bounds, the
         model has motor noise, or the number of seeds is not the number of solutions.
@@ -488,11 +489,11 @@ def execute_noisy(
       Euclidean distance from q to a. A locked base coordinate keeps a_c.
     - With ``signal_dependent`` all three rows have s min(1, L) instead of s. L is then the
       Euclidean distance from q to the target without noise (for a path, to its last waypoint).
-    - The noisy target counts as the target everywhere: for the hit, for the arrival of an aimed
-      movement, and for the tick that the arrival costs.
+    - The noisy target takes the place of the target everywhere: for the hit, for the arrival of an
+      aimed movement, and for the tick that the arrival costs.
     - A corrective movement of the solution is compared with the corrective process in the execution
-      without noise. If their targets differ by more than 1e-9, the movement counts as an aimed
-      movement, which ends on a hit or at its target.
+      without noise. If the targets of the two differ by more than 1e-9, the movement is treated as
+      an aimed movement, which ends on a hit or at its target.
     - z is a function of the seed, the number of the execution, the goal, the number of the movement
       made for this goal and the coordinate (:mod:`coartic.motion.kernels.noise`).
 
@@ -561,9 +562,10 @@ def _execute_exactly(
 ) -> tuple[list[list[list[Movement | None]]], Array]:
     """Execute plans without noise, and find out which movements are aimed movements.
 
-    A corrective movement with a target counts as made by the corrective process if the process,
-    starting where the robot then stands, finds this target to within 1e-9. Otherwise, and if the
-    process does not converge there, it counts as an aimed movement.
+    A corrective movement with a target is treated as a movement of the corrective process if the
+    process, starting from the configuration in which the robot then stands, finds this target to
+    within 1e-9. Otherwise, and if the process does not converge, the movement is treated as an
+    aimed movement.
 
     Returns
     -------
@@ -600,8 +602,8 @@ def _is_found(goal: np.void, target: Array) -> bool:
     """Return whether the corrective process itself finds the target of a corrective movement.
 
     ``goal`` is the record of the goal in an execution in which the process acts in place of the
-    corrective movement to ``target``. The result is True, too, if the movement is not made, because
-    the goal is hit already.
+    corrective movement to ``target``. The result is also True if no movement is made, because the
+    goal is hit already.
     """
     if goal["corrections"] == 0:
         return bool(goal["hit"])
@@ -612,7 +614,8 @@ def _is_found(goal: np.void, target: Array) -> bool:
 def _plan_of(task: Task, number: int, solution: Iterable[Movement]) -> Plan:
     """Return the movements of ``solutions[number]`` for each goal.
 
-    Raises SolutionError, with this number in the message, if the solution breaks the task's rules.
+    Raises SolutionError, whose message contains ``number``, if the solution breaks the task's
+    rules.
     """
     try:
         return movements_by_goal(task, solution)
@@ -621,10 +624,12 @@ def _plan_of(task: Task, number: int, solution: Iterable[Movement]) -> Plan:
 
 
 def _check_ticks(task: Task, number: int, plan: Plan, ticks: float) -> None:
-    """Check that the movements of a solution have the ticks that they take without noise.
+    """Check that a solution's stored ticks are those of its execution without noise.
 
-    ``ticks`` is the number of ticks of the execution, or NaN if it fails. Nothing is checked if a
-    movement of the solution has no ticks. Raises SolutionError if the numbers differ.
+    The sum of the ticks that are stored with the movements is compared with ``ticks``, the ticks of
+    the execution (NaN if the execution fails). Nothing is checked if a movement has no stored
+    ticks. Raises SolutionError if the two numbers differ; ``number`` is the index of the solution
+    in the error message.
     """
     stored = [movement.ticks for movements in plan for movement in movements]
     counts = [count for count in stored if count is not None]
@@ -673,7 +678,7 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or ``task`` or ``model`` has another type.
+        The task cannot be used, or ``task`` or ``model`` has a wrong type.
     ValueError
         The hands do not fit the task, or a constant of the model is out of bounds.
 
@@ -742,7 +747,7 @@ def initial_hands(
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or ``task`` or ``model`` has another type.
+        The task cannot be used, or ``task`` or ``model`` has a wrong type.
     NotApplicableError
         No sequence that was tried completes the task, or there are more than 4096 sequences to try.
     ValueError

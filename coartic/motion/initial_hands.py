@@ -161,7 +161,7 @@ def search_initial_hands(
     sequences of one hand with ``"best-single-hand"``, and all sequences otherwise.
 
     The trials of the search are counted by :func:`count_trials`, even if the result comes from the
-    cache. If the search fails, they are not counted.
+    cache. If the search fails, its trials are not counted.
 
     Parameters
     ----------

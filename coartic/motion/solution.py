@@ -87,8 +87,8 @@ def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
 def next_action(movements: Iterable[Movement]) -> tuple[Movement, ...]:
     """Return copies of movements without what depends on the noise of one execution.
 
-    These are the ticks, and the targets of corrective movements. In the copies they are None, so
-    that the movements can be executed again with other noise.
+    The ticks, and the targets of corrective movements, depend on the noise. In the copies both are
+    None, so that the movements can be executed again with other noise.
     """
     return tuple(
         replace(movement, ticks=None, target=None)
@@ -106,8 +106,8 @@ of a suite is something else.)"""
 def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     """Check a solution, and return a list of its movements for each goal.
 
-    In the result, the target of a path is its last waypoint, and locked base coordinates of targets
-    have their values at the task's start.
+    In the result, the target of a movement of kind ``path`` is its last waypoint. Where the base is
+    locked, the base coordinates of each target are those of the task's start configuration.
 
     Parameters
     ----------
@@ -204,9 +204,9 @@ def _check_point(task: Task, point: Any, kind: Kind = "path") -> Array:
     """Check a target or a waypoint, and return it as an array, shape ``(dof,)``.
 
     The result is the array that was passed, or a new array if locked base coordinates have to be
-    set to their values at the start. Entries of a target may be NaN. Raises ValueError if ``point``
-    is not a configuration of the robot, has only NaN, or moves a locked base coordinate by more
-    than 1e-6.
+    set to those of the task's start configuration. Entries of a target may be NaN. Raises
+    ValueError if ``point`` is not a configuration of the robot, if all entries are NaN, or if it
+    moves a locked base coordinate by more than 1e-6.
     """
     usual = type(point) is np.ndarray and point.dtype == np.float64
     # The length is quick to compute; with a NaN entry it is not below any limit.
@@ -229,7 +229,7 @@ def _check_point(task: Task, point: Any, kind: Kind = "path") -> Array:
 
 
 def _hold_base(task: Task, points: Array) -> Array:
-    """Set locked base coordinates of configurations to their values at the start, in place.
+    """Set locked base coordinates of configurations to those of the task's start, in place.
 
     ``points`` has shape ``(..., dof)`` and is returned; entries that are NaN do not change. Raises
     ValueError if a coordinate differs from the start by more than 1e-6 length units (:data:`HELD`).
@@ -250,9 +250,9 @@ def check_targets(task: Task, targets: Any) -> Configs:
     """Check the targets of N trials, and return a copy of them.
 
     ``targets`` and the copy have shape ``(N, G, dof)``, in length units and rad; NaN is allowed. In
-    the copy, locked base coordinates have their values at the task's start. Raises ValueError for
-    another shape, for infinite entries, and for targets that move a locked base by more than 1e-6
-    length units.
+    the copy, locked base coordinates are set to those of the task's start configuration. Raises
+    ValueError for another shape, for infinite entries, and for targets that move a locked base by
+    more than 1e-6 length units.
     """
     copy = np.array(real_array("targets", targets))
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):

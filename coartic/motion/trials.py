@@ -51,8 +51,8 @@ class TrialRecords(NamedTuple):
 
 
 SHARE = 14 * SLOTS
-"""Smallest number of arms for which a thread is started. Starting a thread takes as long as about a
-hundred trials."""
+"""Smallest number of trials for which a thread is started. Starting a thread takes as long as about
+a hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 """Pool of batches that no thread uses: a dict that maps :attr:`Robot.max_links` to a list of
 batches."""
@@ -113,11 +113,11 @@ def noise_draws(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
 
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> TrialRecords:
-    """Let N arms reach for G goals in order, and return the records.
+    """Make N requested trials with G goals, and return the records.
 
-    An arm that misses a goal makes no movement for later goals. A trial with a target beyond
-    :data:`MAX_ENTRY` fails without a movement; nothing else is checked. ``parameters`` come
-    from :func:`robot_parameters`. Many arms are divided among threads.
+    A trial ends at the first goal that is missed. A trial with a target beyond :data:`MAX_ENTRY`
+    fails without a movement; nothing else is checked. ``arms`` are the requested trials, and
+    ``parameters`` come from :func:`robot_parameters`. Many trials are divided among threads.
     """
     count, goals, moves, _ = arms.targets.shape
     records, idle = empty_records(robot, count, goals, moves), _IDLE[robot.max_links]
@@ -141,7 +141,7 @@ def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> TrialRe
 
 
 class Reached(NamedTuple):
-    """Results of N arms, each of which reached for one goal (:func:`reach_goals`)."""
+    """Results of N reaches, each by one arm for one goal (:func:`reach_goals`)."""
 
     q: Configs
     """Configuration in which each arm ended, shape ``(N, dof)``, in length units and rad."""
@@ -324,8 +324,8 @@ _outside = 0
 def count_trials(count: int) -> None:
     """Add to the number of trials made outside the sessions of runs.
 
-    All trials are added here when they are made. The session of a run then subtracts its own
-    trials, with a negative ``count``. :func:`trials_outside` returns the number.
+    All trials are added when they are made. The session of a run then subtracts the trials of the
+    run, by a negative ``count``. :func:`trials_outside` returns the number.
     """
     global _outside
     _outside += count
@@ -470,8 +470,9 @@ HandSequences = str | Sequence[str]
 def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
     """Return hand sequences as integer codes (0 left, 1 right), shape ``(count, G)``.
 
-    Raises ValueError if a sequence does not fit the task, or if a list has another number of
-    sequences than ``count``.
+    ``hands`` is one sequence for all trials, or one sequence for each of ``count`` trials. Raises
+    ValueError if a sequence does not fit the task, or if the number of sequences in a list is not
+    ``count``.
     """
     is_list = isinstance(hands, Iterable) and not isinstance(hands, str)
     sequences: list[Any] = list(hands) if is_list else [hands]

@@ -100,7 +100,7 @@ def circle_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]
 def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
     """Fill the circles of goals that are hit, and empty all others.
 
-    ``hit`` has a bool for each circle.
+    ``hit`` contains a bool for each circle.
     """
     for circle, is_hit in zip(circles, np.asarray(hit), strict=True):
         circle.set(fill=bool(is_hit), facecolor=_HIT)
@@ -110,8 +110,8 @@ def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) ->
     """Write the number of each goal (from 1) above the goal.
 
     The number is below the goal if another goal is close above. ``weight`` is a factor for the
-    distance between number and goal. ``text`` has options of ``Axes.annotate`` that are not set
-    here, such as ``fontsize``.
+    distance between number and goal. ``text`` are further options of ``Axes.annotate``, such as
+    ``fontsize``.
     """
     goals = task.goal_array
     right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)

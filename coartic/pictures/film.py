@@ -1,7 +1,8 @@
 """Films of movements (GIF or MP4) in the colours of the play page.
 
 Open squares mark the left arm, closed circles the right arm. Goals are numbered circles. A goal is
-filled from the tick at which it is hit, and the film pauses there. Pale lines trace the hands.
+filled from the tick at which it is hit, and the film pauses at this tick. Pale lines trace the
+hands.
 """
 
 from __future__ import annotations

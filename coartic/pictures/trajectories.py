@@ -46,7 +46,7 @@ class Trajectory:
 
     @property
     def hands(self) -> tuple[Hand, ...]:
-        """Name of the hand for each goal; ``execution.hands`` has the letters."""
+        """Name of the hand for each goal, such as ``("right", "left")``."""
         return hands_of(self.execution.hands)
 
     @property
@@ -90,7 +90,7 @@ class Trajectory:
         - ``left_x``, ``left_y``, ``right_x`` and ``right_y`` (in length units): the positions of
           both hands.
 
-        ``attrs["units"]`` has the units.
+        ``attrs["units"]`` is a dict that maps columns to units.
         """
         import pandas as pd
 
@@ -157,7 +157,7 @@ class Trajectory:
             The file has another suffix, no control tick was made, or the file exists or cannot be
             written.
         ArgumentError
-            An argument has another type, or ``width`` is out of range.
+            An argument has a wrong type, or ``width`` is out of range.
         """
         from coartic.pictures.film import write_film
 

@@ -44,8 +44,8 @@ def play_page(task: Task | None = None) -> str:
 def player_figure(presets: Sequence[dict[str, Any]], **options: Any) -> str:
     """Return the interactive figure as HTML.
 
-    The page that contains it must have the styles of ``play.css``, and define the colours that
-    ``play.css`` names.
+    The page that contains the figure must include the styles of ``play.css``, and define the
+    colours that ``play.css`` names.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def player_figure(presets: Sequence[dict[str, Any]], **options: Any) -> str:
         - ``page``: address to which links lead, None for no link;
         - ``first``: what is shown at first;
         - ``folder``: folder with the stored runs, quoted for a shell;
-        - ``cells``: cells of tables that start films, each with the id of the cell and the film.
+        - ``cells``: cells of tables that start films: for each cell, its id and the film.
     """
     content = {"presets": presets, "version": coartic.__version__, **options}
     data = json.dumps(content, allow_nan=False, separators=(",", ":"))

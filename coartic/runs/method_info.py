@@ -90,9 +90,10 @@ class MethodInfo:
         return load_method(*self.key)
 
     def configure(self, parameters: Mapping[str, Any]) -> Method:
-        """Import the method and return an instance with parameters.
+        """Import the method, and return an instance of its class with given parameters.
 
-        Parameters that are not passed have their defaults. Raises ValueError for a wrong parameter.
+        For a parameter that is not passed, the default is used. Raises ValueError for a wrong
+        parameter.
         """
         method = self.load()
         return method(method.Parameters(**parameters))
@@ -100,8 +101,8 @@ class MethodInfo:
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """Return a dict of the parameters that identify a run, as plain data.
 
-        The dict has the parameters of :data:`ALWAYS_IN_IDS`, and all parameters that differ from
-        their defaults. Raises CoarticError for a wrong parameter.
+        The dict contains the parameters of :data:`ALWAYS_IN_IDS`, and all parameters that differ
+        from their defaults. Raises CoarticError for a wrong parameter.
         """
         return dict(self._ask("complete", parameters))
 
@@ -110,7 +111,7 @@ class MethodInfo:
     ) -> str | None:
         """Return why the method, with given parameters, does not apply to a task; else None.
 
-        Parameters that are not passed have their defaults. Raises CoarticError for a wrong
+        For a parameter that is not passed, the default is used. Raises CoarticError for a wrong
         parameter, or if the method cannot say whether it applies.
         """
         reason = self._ask("inapplicable_reason", parameters or {}, *outline_of(task))
@@ -128,8 +129,9 @@ class MethodInfo:
         -------
         dict
             - ``quick``: :attr:`.Method.quick`;
-            - ``config``: pydantic's settings of its parameters, ``extra`` (``"forbid"`` if unknown
-              parameters are refused) and ``frozen`` (True if parameters cannot be set).
+            - ``config``: two of pydantic's settings of the class of its parameters: ``extra``
+              (``"forbid"`` if unknown parameters are refused) and ``frozen`` (True if parameters
+              cannot be set).
         """
         return dict(self._ask("rules"))
 
@@ -241,7 +243,7 @@ def _defaults(method: type[Method]) -> dict[str, Any]:
 def _plain_parameters(method: type[Method], values: Mapping[str, Any]) -> dict[str, Any]:
     """Return a dict that maps parameters to values, as plain data.
 
-    Raises CoarticError for a value with infinity or NaN, which JSON does not have.
+    Raises CoarticError for a value that contains infinity or NaN, which cannot be written as JSON.
     """
     plain_values = {}
     for name, value in values.items():
@@ -285,8 +287,8 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
 def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Method]]:
     """Return the classes of methods that a module defines itself, not those that it imports.
 
-    If ``abstract`` is True, only the classes that lack a function, such as ``solve``, are returned;
-    otherwise only the complete classes.
+    If ``abstract`` is True, only the classes that lack a function, such as ``solve``, are returned.
+    Otherwise only the classes that lack no function are returned.
     """
     return [
         value

@@ -22,7 +22,7 @@ from coartic.tasks.task import Task
 
 @dataclass(frozen=True)
 class Cell:
-    """A method with its parameters on a task, and its budget of trials."""
+    """A method with its parameters on a task, and the budget of trials of a run."""
 
     task: Task
     method: MethodInfo
@@ -154,8 +154,8 @@ def cell_of(
     task : Task
     method : MethodInfo
     parameters : mapping of str to object
-        Dict that maps parameters of the method to values. Parameters that are not passed have their
-        defaults.
+        Dict that maps parameters of the method to values. For a parameter that is not passed, the
+        default is used.
     trials : int, optional
         Default of parameter ``trials``, for methods that have it.
     trial_budget : int, optional
@@ -195,8 +195,8 @@ def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
 def run_seed(suite_seed: int, task: str, number: int) -> int:
     """Return the seed of a run.
 
-    The seed depends only on the suite's seed, the task's name and the run's number. It does not
-    depend on the method, so that the runs of two methods are paired.
+    The seed depends only on the suite's seed, the task's name and the run's number. The seed does
+    not depend on the method, so that the runs of two methods are paired.
     """
     return _seed_of(suite_seed, task, number)
 
@@ -205,7 +205,7 @@ def judge_seed(suite_seed: int, task: str, number: int) -> int:
     """Return the seed of the noise for scoring run ``number`` of a task.
 
     The seed is a hash of the suite's seed, the task's name, the run's number and the word *judge*.
-    All methods have the same seed, and no method sees noise with this seed in its own trials.
+    The seed is the same for all methods, and no method sees noise with this seed in its own trials.
     """
     return _seed_of(suite_seed, f"{task} judge", number)
 

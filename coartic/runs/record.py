@@ -59,7 +59,10 @@ path from the start through all targets and waypoints."""
 
 @dataclass(frozen=True)
 class Times:
-    """Time and memory of a run. The runs of a job share its time equally."""
+    """Time that a run took, and memory of the process that made it.
+
+    The time of a job is divided equally among the runs of the job.
+    """
 
     wall_s: float | None = None
     """Wall time (in s); None if unknown."""
@@ -137,7 +140,7 @@ class Row:
         return [*map(movement_from, self.movements.get(name, []))]
 
     def with_values(self, **values: Any) -> Row:
-        """Return a copy of the row in which some columns have other values.
+        """Return a copy of the row in which the values of some columns are replaced.
 
         The columns and their new values are passed as keyword arguments.
         """
@@ -166,7 +169,7 @@ def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date
     """Return the row of a run from its outcome and the executions of its parts.
 
     The columns of ticks with noise are empty; :func:`coartic.benchmarks.scoring.with_noise` fills
-    them.
+    these columns.
 
     Parameters
     ----------
@@ -385,9 +388,9 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
     """Encode the rewards of trials as bytes, which the caller compresses.
 
     Each number has four bytes. The first number is the best reward, signed (0 if there is none).
-    The number of each trial is 1 plus the difference between the best reward and the trial's, or 0
-    if the trial's reward is None. The lowest bytes of all numbers come first, then the next bytes,
-    because bytes compress better in this order.
+    The number of each trial is 1 plus the difference between the best reward and the reward of the
+    trial, or 0 if the reward of the trial is None. The lowest bytes of all numbers come first, then
+    the second lowest bytes of all numbers, and so on, because bytes compress better in this order.
     """
     values = np.array(rewards, np.float64)  # None becomes NaN
     best = 0.0 if np.isnan(values).all() else np.nanmax(values)
@@ -430,8 +433,8 @@ def judge(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Compute the mean ticks of recommended solutions over many executions with motor noise.
 
-    A failed execution counts as twice the ticks that the corrective process with its best hands
-    takes without noise.
+    For a failed execution, twice the ticks that the corrective process with its best hands takes
+    without noise are used.
 
     Parameters
     ----------
@@ -451,7 +454,7 @@ def judge(
         Mean ticks; NaN if an execution failed and the corrective process does not complete the
         task with any hands.
     ndarray of int, shape (K,)
-        How many executions failed.
+        Number of executions of each answer that failed.
     """
     exact = model.without_noise()
     ticks = execute_noisy(task, answers, model.motor_noise, executions, seeds, exact)

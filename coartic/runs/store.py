@@ -1,9 +1,9 @@
 """The runs of a results folder, in the SQLite file ``runs.sqlite``.
 
-Table ``cells`` has a row for each cell that a command has asked for. The *plan* of the folder
-consists of the cells of the last ``coartic run``; only these cells have values in columns
-``position`` and ``runs``. Table ``results`` has a row for each run, with its movements and the
-rewards of its trials. The views ``runs`` and ``solutions`` show the runs of the plan;
+Table ``cells`` contains a row for each cell that a command has asked for. The *plan* of the folder
+consists of the cells of the last ``coartic run``; for all other cells, columns ``position`` and
+``runs`` are empty. Table ``results`` contains a row for each run, with the movements of the run and
+the rewards of its trials. The views ``runs`` and ``solutions`` show the runs of the plan;
 docs/results.md lists their columns.
 
 Only one process writes at a time. It writes finished runs in batches. After any interruption a
@@ -153,8 +153,8 @@ class Store:
     def plan(self) -> list[Job]:
         """Return the plan of the folder.
 
-        ``question`` of the jobs is None, and ``where`` of their methods is empty. Raises
-        CoarticError if no plan is stored yet.
+        Attribute ``question`` of the jobs is None, and attribute ``where`` of their methods is
+        empty. Raises CoarticError if no plan is stored yet.
         """
         made_with = self.made_with()
         limits = made_with.get("time_limit_s"), made_with.get("trials")
@@ -202,22 +202,22 @@ class Store:
     # Ids and counts of runs.
 
     def present(self) -> list[tuple[int, int, str, float | None]]:
-        """Return the runs of the plan that the folder has.
+        """Return the runs of the plan that are stored in the folder.
 
         Returns
         -------
         list of tuple
-            An entry ``(position, number, status, time_limit_s)`` for each run. ``position`` is that
-            of the run's job in the plan, from 0. ``time_limit_s`` is the limit of CPU time (in s),
-            or None for no limit.
+            An entry ``(position, number, status, time_limit_s)`` for each run. ``position`` is the
+            position of the job of the run in the plan, from 0. ``time_limit_s`` is the limit of CPU
+            time (in s), or None for no limit.
         """
         return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
     def count_outdated_runs(self) -> Counter[tuple[str, str, str]]:
         """Count the planned runs that an older or other version of the method made.
 
-        The keys are triples: id of the method, version (or code) that made the runs, and version in
-        the plan.
+        The result is keyed by triples: id of the method, version (or code) that made the runs, and
+        version (or code) in the plan.
         """
         query = """SELECT now.method, old.code, now.code, count(*) FROM suite
             JOIN cells AS now ON now.runs IS NOT NULL
@@ -231,7 +231,7 @@ class Store:
 
         Only runs of the plan are considered. A warning is a sentence which says that
 
-        - a run had another result when it was made again;
+        - a run that was made again gave another result;
         - runs were made with other versions of packages that the method's file imports.
         """
         warnings_by_method = defaultdict[str, list[str]](list)
@@ -253,9 +253,10 @@ class Store:
         return dict(warnings_by_method)
 
     def imports(self) -> dict[str, list[str]]:
-        """Return a dict that maps ids of methods to the packages that their files import.
+        """Return the packages that the files of methods import, as a dict keyed by id of method.
 
-        A package is a name with a version. All runs of the plan are considered.
+        The values are lists of strings such as ``numpy 2.1.0``. All runs of the plan are
+        considered. Methods whose file imports no package are left out.
         """
         by_method = defaultdict[str, dict[str, None]](dict)
         for method, made, _ in self._packages():
@@ -265,16 +266,16 @@ class Store:
         return {method: sorted(packages) for method, packages in by_method.items() if packages}
 
     def _packages(self) -> Iterator[tuple[str, dict[str, str], dict[str, str]]]:
-        """Yield the packages that a method's file imports, for each environment of its runs.
+        """Yield the packages that a method's file imports, for each environment of stored runs.
 
         Yields
         ------
         str
             Id of the method.
         dict
-            Versions with which the runs were made, by name of the package.
+            Dict that maps the name of each package to the version with which the runs were made.
         dict
-            Versions that the last ``coartic run`` had.
+            Dict that maps the name of each package to its version in the last ``coartic run``.
         """
         query = """SELECT DISTINCT asked.method, json_extract(environments.content, '$.imports'),
             json_extract(cells.content, '$.method.packages') FROM asked
@@ -288,13 +289,13 @@ class Store:
     def others(self) -> int:
         """Return the number of runs in the folder that do not belong to the plan.
 
-        Runs of other versions of a method (:meth:`count_outdated_runs`) are included.
+        Runs that other versions of a method made (:meth:`count_outdated_runs`) are included.
         """
         query = "SELECT (SELECT count(*) FROM results) - (SELECT count(*) FROM asked)"
         return int(self._rows(query)[0][0])
 
     def ids(self, prefix: str = "") -> list[str]:
-        """Return the ids that begin with ``prefix``, of all runs in the folder."""
+        """Return the ids of all runs in the folder that begin with ``prefix``."""
         query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
         return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
@@ -369,8 +370,9 @@ class Store:
     def run(self, run_id: str) -> Row:
         """Return a run by its id.
 
-        ``suite`` of its job and ``where`` of its method are empty. Raises CoarticError if the
-        folder does not have the run, or if the stored run does not match the id.
+        Attribute ``suite`` of its job and attribute ``where`` of its method are empty. Raises
+        CoarticError if the run is not stored in the folder, or if the stored run does not match the
+        id.
         """
         query = """SELECT results.*, cells.content AS cell_content, environments.content AS made
             FROM results JOIN cells ON cells.id = cell
@@ -405,7 +407,7 @@ class Store:
             )
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs``: a row for each stored run of the plan, in order.
+        """Return view ``runs``: a row for each stored run of the plan, in the order of the plan.
 
         Returns
         -------
@@ -441,8 +443,8 @@ class Store:
         part : {"solution", "initial", "replay"}
             Runs without this part are left out.
         most : int
-            Largest number of runs for each cell of the plan. The first runs of the cell with status
-            ``ok`` are returned.
+            Largest number of runs for each cell of the plan. Of each cell, the first runs with
+            status ``ok`` are returned.
         """
         query = """SELECT run_id, json_extract(movements, ?) FROM
             (SELECT run_id, movements, position, run,
@@ -476,8 +478,8 @@ class Store:
     def outdated_noise(self) -> list[list[str]]:
         """Return the ids of runs whose ticks follow another rule of noise.
 
-        Only runs of the plan with status ``ok`` are considered. The result has a list of ids for
-        each cell with such runs.
+        Only runs of the plan with status ``ok`` are considered. The result contains a list of ids
+        for each cell with such runs.
         """
         rule = "noise_rule" if "noise_rule" in self._columns("asked") else "NULL"
         query = f"""SELECT position, run_id FROM asked WHERE status = 'ok'
@@ -570,9 +572,9 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
 
 
 def _cell_from(cell_id: str, content: str) -> Cell:
-    """Return a cell from its JSON. ``where`` of its method is empty.
+    """Return a cell from its JSON. Attribute ``where`` of the cell's method is empty.
 
-    Raises ValueError if the JSON is not a cell, or not the cell of this id.
+    Raises ValueError if the JSON is not a cell, or if it is a cell with another id.
     """
     cell: Cell = _CELL.validate_python(json.loads(content))
     if cell.id != cell_id:
@@ -621,7 +623,7 @@ def open_store(folder: Path) -> Iterator[Store]:
 def open_content(content: bytes, name: str) -> Iterator[Store]:
     """Open the content of a ``runs.sqlite`` in memory, for reading in a ``with`` block.
 
-    ``name`` stands for its folder in messages.
+    ``name`` stands for the folder in messages.
     """
     with closing(_connect(":memory:")) as connection:
         connection.deserialize(content)
@@ -632,7 +634,7 @@ def open_content(content: bytes, name: str) -> Iterator[Store]:
 def open_store_for_writing(folder: Path) -> Iterator[Store]:
     """Lock a results folder, and open it for writing in a ``with`` block.
 
-    A missing folder is made. Raises CoarticError if the folder contains something else, if it
+    A missing folder is made. Raises CoarticError if the folder contains files but no results, if it
     cannot be written, or if another process writes into it.
     """
     path = folder / RUNS_FILE

@@ -1,8 +1,8 @@
 """Families of random tasks: distributions of tasks, and instances that never change.
 
-A family is defined by a file, ``families/NAME.vN.toml``. The file has the distributions from which
-the number and the positions of the goals, the links of the arms, the base and the start are drawn.
-The file of a released family does not change; a changed family gets a new version.
+A family is defined by a file, ``families/NAME.vN.toml``. The file contains the distributions from
+which the number and the positions of the goals, the links of the arms, the base and the start are
+drawn. The file of a released family does not change; a changed family gets a new version.
 
 An instance is a task with a name such as ``two-armed/v1/i017``. It depends only on the file of the
 family and on its name, because its numbers come from a counter-based random number generator
@@ -383,7 +383,7 @@ def instance(name: str) -> Task:
 
     Examples of names are ``two-armed/v1/i017`` and, for the family of a file,
     ``mine.v1.toml/i017``. The last 4096 instances are cached (LRU). Raises TaskError if the family
-    is unknown or cannot be used, or if the name has another form.
+    is unknown or cannot be used, or if the name is not of this form.
     """
     family, _, short = name.rpartition("/")
     address = address_of(f"{load_family(family).name}/{short}" if is_file(family) else name)
@@ -406,10 +406,10 @@ def is_file(family: str) -> bool:
 def named_by(text: str) -> list[str]:
     """List the names of the instances in a range such as ``two-armed/v1/i000..i039``.
 
-    Both ends are included. If ``text`` is not a range, such as a task's name or file, the list has
-    ``text`` as its only entry, without a check. Raises TaskError for a range that is malformed,
-    goes backwards or has more than 10,000 instances. Whether a shipped family exists is not
-    checked.
+    Both ends are included. If ``text`` is not a range, but for example the name or the file of a
+    task, the only entry of the list is ``text`` itself, unchecked. Raises TaskError for a range
+    that is malformed, goes backwards or has more than 10,000 instances. Whether a shipped family
+    exists is not checked.
 
     Examples
     --------
@@ -445,8 +445,8 @@ def shipped_families() -> dict[str, Family]:
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
     """Read families from files, and return a dict that maps their names to the families.
 
-    Raises TaskError for a file that cannot be used, and for a name that belongs to another of the
-    files or to a shipped family.
+    Raises TaskError for a file that cannot be used, and for a name that is also the name of another
+    family in the files, or of a shipped family.
     """
     families: dict[str, Family] = {}
     for path in paths:
@@ -474,7 +474,7 @@ def load_family(name: str) -> Family:
 def is_family(name: str) -> bool:
     """Return whether a string is the name of a shipped family or a family's file.
 
-    A ``.toml`` file is a family's if it can be read and has the key ``region``.
+    A ``.toml`` file is the file of a family if it can be read and contains the key ``region``.
     """
     with suppress(TaskError):
         return name in shipped_families() or (

@@ -1,8 +1,8 @@
 """The best known rewards that come with the package, and proven bounds on rewards.
 
-``optima.json`` has the best reward that any method found for each of the paper's tasks, with run
-ids and solutions. ``best_known.csv`` has the best reward for test instances of families, and
-``best_in_noise.csv`` the fewest mean ticks known for tasks with motor noise. The study
+``optima.json`` contains the best reward that any method found for each of the paper's tasks, with
+run ids and solutions. ``best_known.csv`` contains the best rewards for test instances of families,
+and ``best_in_noise.csv`` contains the fewest mean ticks known for tasks with motor noise. The study
 ``studies/optima`` copies better rewards from results folders, and proves the bounds.
 """
 
@@ -67,7 +67,7 @@ def task_hash(task: Task) -> str:
 def best_shipped(task: Task, model: MotionModel = PAPER) -> KnownOptimum | None:
     """Look up the best known reward of a task under a motion model.
 
-    The task is identified by :func:`task_hash`; its name does not matter. The shipped files have
+    The task is identified by :func:`task_hash`; its name does not matter. The shipped files contain
     best known rewards for
 
     - the paper's model, and the paper's model with motor noise 0.01, but no other models;
@@ -105,8 +105,8 @@ def entries() -> list[dict[str, Any]]:
     """Read ``optima.json``, and return a new list of its entries.
 
     There is an entry for each combination of a task of the paper, a restriction of the base, and a
-    restriction of the idle arm. (A task that locks y itself has no entry for ``y``.) An entry is a
-    dict with the keys
+    restriction of the idle arm. (For a task that locks y itself, there is no entry for ``y``.) An
+    entry is a dict with the keys
 
     - ``task``: name of the task;
     - ``essence``: :func:`task_hash`, without the restriction;

@@ -23,7 +23,8 @@ _WEYL = 0x9E3779B9, 0xBB67AE85  # golden ratio, sqrt(3) - 1
 def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
     """Return four random words of 32 bits: a function of a counter and a key.
 
-    The counter has four words of 32 bits, the key two. Equal arguments give equal words.
+    The counter consists of four words of 32 bits, and the key consists of two. Equal arguments give
+    equal words.
     """
     a, b, c, d = counter
     left, right = key

@@ -101,8 +101,8 @@ class Address(NamedTuple):
 def address_of(name: str) -> Address | None:
     """Parse the name of an instance, or return None for another form.
 
-    The number has at least three digits, without needless zeros: ``i017``, but not ``i0017``.
-    Whether the family exists is not checked.
+    The number is written with at least three digits, but without needless zeros: ``i017``, but not
+    ``i0017``. Whether the family exists is not checked.
 
     Examples
     --------
@@ -141,12 +141,12 @@ class Start(FileData):
 class Task(FileData):
     """A sequence of goals to hit in order, each with one hand of the robot.
 
-    :func:`load_task` reads a task from a file, or finds it by its name. Fields cannot be changed.
-    In Python a configuration ``q0=``, shape ``(dof,)``, can be passed instead of ``start``:
-    ``Task(goals=[(3, 2), (4.5, 2)], q0=np.zeros(10))``.
+    :func:`load_task` reads a task from a file, or finds it by its name. Fields of a task cannot be
+    changed. In Python a configuration ``q0=``, shape ``(dof,)``, can be passed instead of
+    ``start``: ``Task(goals=[(3, 2), (4.5, 2)], q0=np.zeros(10))``.
 
-    Source of the shipped tasks: paper, section *Experiments*. ``provenance`` has the source of each
-    number.
+    Source of the shipped tasks: paper, section *Experiments*. ``provenance`` contains the source of
+    each number.
     """
 
     name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=MAX_NAME_LENGTH)] = "unnamed"
@@ -220,7 +220,8 @@ class Task(FileData):
     def split(self) -> Split | None:
         """Split of an instance of a family: ``"development"``, ``"test"`` or ``"fresh"``.
 
-        The split follows from the form of the task's name. It is None for names of another form.
+        The split follows from the form of the task's name. The split is None if the name is of
+        another form.
         """
         address = address_of(self.name)
         return address and address.split
@@ -236,11 +237,12 @@ class Task(FileData):
     def _with_start(cls, content: Any) -> Any:
         """Return the content of a task with the key ``start``.
 
-        - Content that has the key ``start``, or is not a dict, is returned unchanged.
-        - If the content has the key ``q0``, shape ``(dof,)``, ``start`` is computed from ``q0``.
-        - Otherwise ``start`` has the base at (0, 0), and both arms straight along +x.
+        - Content that contains the key ``start``, or is not a dict, is returned unchanged.
+        - If the content contains the key ``q0``, shape ``(dof,)``, ``start`` is computed from
+          ``q0``.
+        - Otherwise ``start`` is set: the base is at (0, 0), and both arms are straight along +x.
 
-        Raises a validation error if the content has both keys or if ``q0`` is wrong.
+        Raises a validation error if the content contains both keys, or if ``q0`` is wrong.
         """
         if not isinstance(content, dict):
             return content
@@ -353,8 +355,8 @@ class Task(FileData):
 def check_hands(task: Task, hands: str) -> str:
     """Check a hand sequence, such as ``"RRLR"``, and return it unchanged.
 
-    Raises ValueError unless ``hands`` is a string with the letter of one of the task's hands for
-    each goal.
+    Raises ValueError unless ``hands`` is a string that contains, for each goal, the letter of one
+    of the task's hands.
     """
     allowed = letters_of(sorted(task.hands))
     fits = isinstance(hands, str) and len(hands) == len(task.goals)
@@ -370,7 +372,7 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
     """Return a sentence on the first goal that is out of reach, or None.
 
     A goal is out of reach if no hand of the task can come within ``tolerance`` (in length units) of
-    its centre, or if the hand that ``initial_hands`` names for it cannot.
+    its centre, or if the hand that ``initial_hands`` names for the goal cannot.
     """
     named = None if task.initial_is_policy else hands_of(task.initial_hands)
     for index, goal in enumerate(task.goals):
@@ -392,10 +394,9 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
 def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float:
     """Return how far a goal is out of a hand's reach (length units).
 
-    The result is above 0 if the goal is out of reach, and otherwise at most 0. It is the difference
-    between two distances: how far the goal's centre is outside the range of distances that the hand
-    can have from its shoulder, and ``tolerance``. Base coordinates that are not locked can take any
-    value.
+    The result is above 0 if the goal is out of reach, and otherwise at most 0. The hand can be at a
+    certain range of distances from its shoulder. The result is the distance of the goal's centre
+    from this range, minus ``tolerance``. Base coordinates that are not locked can take any value.
     """
     arm = task.robot.arm(hand)
     near, far = task.robot.reach(hand)
@@ -412,7 +413,7 @@ def check_task(task: Task) -> Task:
 
     The paper's corrective process ends within a tenth of the radius from a goal's centre. Raises
     TaskError if no hand of the task can come that near to a goal, or if the hand that
-    ``initial_hands`` names for a goal cannot.
+    ``initial_hands`` names for a goal cannot come that near to it.
     """
     _, tolerance = PAPER.tolerances(task.radius)
     if (problem := _out_of_reach(task, tolerance)) is not None:
@@ -423,8 +424,8 @@ def check_task(task: Task) -> Task:
 def read_task(path: Path) -> Task:
     """Read a task from its TOML file.
 
-    A task without the key ``name`` has the name of the file without its suffix. Raises TaskError,
-    which names the file, if the file is not a task.
+    If the key ``name`` is missing, the name of the task is the name of the file without its suffix.
+    Raises TaskError, which names the file, if the file is not a task.
     """
     return parse_task({"name": path.stem, **read_toml(path, error=TaskError)}, str(path))
 
@@ -493,8 +494,9 @@ def task_text(task: Task) -> str:
 def _toml_value(value: Any) -> str:
     """Return a value in the notation of TOML.
 
-    The value is a string of printable characters, a number, a list or a dictionary of such values.
-    It is written as in JSON, except that a dictionary becomes an inline table with bare keys.
+    The value is a string of printable characters, a number, a list without dictionaries, or a
+    dictionary of such values. A dictionary becomes an inline table with bare keys. Any other value
+    is written as in JSON.
     """
     if isinstance(value, dict):
         return (

@@ -4,8 +4,8 @@ A claim says that a mean over tasks lies beyond a bound (:func:`mean_beyond`), o
 several means does (:func:`all_of`). :func:`judge` adjusts the p-values of all claims of a study
 together, by Holm's method. Two rules make verdicts stricter:
 
-- A claim that holds is undecided if its tests are not significant without the task that favours the
-  claim most.
+- A claim that holds is undecided if its tests are no longer significant when the task that favours
+  the claim most is left out.
 - If the values over tasks are very skewed, the level of significance is 1 % instead of 5 %
   (:func:`level_of`).
 """
@@ -71,7 +71,11 @@ def level_of(values: ArrayLike) -> float:
 
 @dataclass(frozen=True)
 class Finding:
-    """Evidence and tests of one claim, before p-values are adjusted for multiple tests."""
+    """Evidence and tests of one claim.
+
+    The p-values of the tests in :attr:`tests`, :attr:`against` and :attr:`without` are not yet
+    adjusted for multiple tests.
+    """
 
     holds: bool | None
     """True if the means lie where the claim says, otherwise False. It is None if there are too few
@@ -139,9 +143,9 @@ def _largest_p(tests: Iterable[Estimate]) -> float:
 def _tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
     """Test whether the mean over tasks exceeds a bound, with and without the largest value.
 
-    ``values`` has one value for each task, shape ``(tasks,)``, for at least two tasks. The first
-    test has all values, and the second test leaves out the largest value. A p-value is NaN for a
-    test of a single value.
+    ``values`` contains one value for each task, shape ``(tasks,)``, for at least two tasks. The
+    first test uses all values, and the second test leaves out the largest value. A p-value is NaN
+    for a test of a single value.
     """
     by_task = np.asarray(values, dtype=np.float64)
     others = np.delete(by_task, by_task.argmax())
@@ -162,7 +166,7 @@ def mean_beyond(
         Beginning of the evidence, with exactly one ``{}``, which is replaced by the mean with its
         interval. Other braces are kept.
     values : array_like, shape (tasks,)
-        One value for each task. A task without a value has NaN and does not count.
+        One value for each task. NaN stands for a task without a value, which is left out.
     bound : float
         The bound, in the unit of the values.
     side : {"greater", "less"}
@@ -173,10 +177,11 @@ def mean_beyond(
     Finding
         - ``holds`` is True if the mean lies on the claimed side. It is None, and there are no
           tests, if there are values for fewer than three tasks.
-        - ``tests`` has the test of the claim.
-        - ``without`` has the same test without the task that favours the claim most.
-        - ``against`` has the test of the opposite of the claim. It is made with all tasks, and
-          without the task that favours the opposite most; the test with the larger p-value counts.
+        - ``tests`` contains the test of the claim.
+        - ``without`` contains the same test without the task that favours the claim most.
+        - ``against`` contains a test of the opposite of the claim. The test is made twice, with all
+          tasks and without the task that favours the opposite most; the test with the larger
+          p-value is kept.
 
     Raises
     ------
@@ -226,9 +231,9 @@ def all_of(*findings: Finding) -> Finding:
     Returns
     -------
     Finding
-        A finding that holds if all findings hold. It has the tests and the evidence of all of them,
-        and the smallest of their levels. If a finding has too few tasks (``holds`` is None), the
-        first such finding is returned instead.
+        A finding that holds if all findings hold. The tests and the evidence of all findings are
+        joined, and the level is the smallest of all levels. If a finding has too few tasks
+        (``holds`` is None), the first such finding is returned instead.
 
     Raises
     ------
@@ -262,8 +267,8 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     Parameters
     ----------
     claims : mapping of str to (str, str, Finding)
-        Maps the id of each claim to its statement, its test in words, and its finding. A claim
-        without a p-value counts in the adjustment, too.
+        Maps the id of each claim to its statement, its test in words, and its finding. Claims
+        without a p-value are included in the number of tests for which p-values are adjusted.
 
     Returns
     -------
@@ -334,7 +339,7 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        The table of :func:`judge`, with the claims of ``values`` in their order.
+        The table of :func:`judge` for the claims of ``values``, in the order of ``values``.
 
     Raises
     ------
@@ -381,7 +386,8 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
 def _mean_as_asked(asked: Mapping[str, Any], group: str, values: Any) -> Finding:
     """Return the finding on one mean of a claim, for one group of tasks (:func:`judge_means`).
 
-    ``asked`` is the table of the mean in the TOML file, and ``values`` has a value for each task.
+    ``asked`` is the table of the mean in the TOML file, and ``values`` contains a value for each
+    task.
     """
     sentence = asked["sentence"].replace("{group}", group)
     if "within" in asked:

@@ -195,12 +195,12 @@ def expect(holds: bool, what: str) -> str:
 def control_suite(study: Study, *, runs: int = 20) -> str:
     """Return a suite of random search that a study needs as control of signatures.
 
-    For each method that can select its solution from trials, and each task, the suite has a block
-    for each hand sequence that at least a tenth of the method's solved runs have. In this block,
-    random search has this hand sequence and the method's number of trials, and adds noise to the
-    idle arm if the method does. Controls that the study already has are left out. The control of
-    the signature ``hand``, which is random search that tries all hand sequences, is not in the
-    suite.
+    For each method that can select its solution from trials, and each task, the suite contains a
+    block for each hand sequence that occurs in at least a tenth of the method's solved runs. In
+    this block, random search uses this hand sequence and makes as many trials as the method, and
+    adds noise to the idle arm if the method does so. Controls that already exist in the study are
+    left out. The control of the signature ``hand``, which is random search that tries all hand
+    sequences, is not in the suite.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
 """Kernels: functions that Numba compiles when they are first called.
 
 Numba is imported at the first call of a kernel, so that a command that only lists names does not
-need it. The machine code is stored on disk. Numba compiles a cached function again only if its own
-file has changed; it would miss a change of a function from another file that it calls. So here the
-name of the folder of the machine code contains a hash of all files that define kernels. If one of
-these files changes, all kernels are compiled again.
+need it. The machine code is stored on disk. Numba compiles a cached function again only if the file
+of this function has changed. Numba would miss a change of another file that defines a function
+called by this function. So here the name of the folder of the machine code contains a hash of all
+files that define kernels. If one of these files changes, all kernels are compiled again.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
 def fill_row(row: Any, values: Any) -> None:
     """Copy numbers from the beginning of ``values`` into ``row``, in place.
 
-    If the lengths differ, as many numbers are copied as the shorter of the two has.
+    If the lengths differ, the number of copied numbers is the smaller length.
     """
     for j in range(min(len(row), len(values))):
         row[j] = values[j]
@@ -151,8 +151,9 @@ _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy
 def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
     """Return the memory addresses through which kernels draw from N > 0 NumPy generators.
 
-    The result has shape ``(N, 3)``. A row has the addresses of the state and of two C functions of
-    a generator, for :func:`generator_at`. The generators must exist until the kernel returns.
+    The result has shape ``(N, 3)``. A row contains the addresses of the state and of two C
+    functions of a generator, for :func:`generator_at`. The generators must exist until the kernel
+    returns.
     """
     rows = [
         [ctypes.cast(getattr(c, name), ctypes.c_void_p).value for name in _DRAWS]
@@ -203,8 +204,8 @@ def import_numba() -> Any:
 def _set_up_numba() -> Any:
     """Import Numba, set it up, and return the module.
 
-    LLVM's options change only the speed of kernels. They have no effect if the program has compiled
-    something else with Numba before.
+    LLVM's options change only the speed of kernels. The options have no effect if the program has
+    compiled something else with Numba before.
     """
     modules: dict[str, Any] = sys.modules
     yaml_module = {"yaml": modules["yaml"]} if "yaml" in modules else {}
@@ -340,8 +341,8 @@ def _cache_folder() -> Path | None:
 def _remove_old(root: Path, current: Path) -> None:
     """Remove folders of machine code that no process has begun to use for 30 days.
 
-    The folders are looked for in ``root``. Folder ``current`` counts as used now, whatever the
-    clock says.
+    The folders are looked for in ``root``. Folder ``current`` is not removed, and its time stamp is
+    set to now.
     """
     with contextlib.suppress(OSError):
         os.utime(current)

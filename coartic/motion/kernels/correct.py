@@ -152,8 +152,8 @@ def project(v: Any, x: Any, y: Any) -> None:
     """Project a change of base and joints onto a Jacobian's null space, in place.
 
     The change becomes v − J⁺ J v with J⁺ = Jᵀ (J Jᵀ)⁺. The rows of J are ``x`` and ``y``; all
-    arguments have shape ``(n,)``. A singular value of at most a millionth of the larger one counts
-    as 0.
+    arguments have shape ``(n,)``. A singular value of at most a millionth of the larger one is
+    treated as 0.
     """
     a, b, c, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(len(v)):
@@ -208,7 +208,7 @@ def _find_nullspace_changes(slots: SlotArrays, count: int, robot: RobotRecord, r
 def correct_slots_informed(batch: Batch, count: int, robot: RobotRecord) -> None:
     """Run the corrective process with null-space steps to each run's preferred posture.
 
-    The process runs in the first ``count`` slots. Its results are set in the runs' records
+    The process runs in the first ``count`` slots. The results are set in the records of the runs
     (:func:`descend_to_goals`).
     """
     descend_to_goals(batch, count, robot, _find_nullspace_changes)
@@ -218,7 +218,7 @@ def correct_slots_informed(batch: Batch, count: int, robot: RobotRecord) -> None
 def correct_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
     """Run the paper's corrective process in the first ``count`` slots.
 
-    The results are set in the runs' records (:func:`descend_to_goals`).
+    The results are set in the records of the runs (:func:`descend_to_goals`).
     """
     descend_to_goals(batch, count, robot, None)
 
@@ -227,10 +227,10 @@ def correct_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
 def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> int:
     """Let a corrective process set the ``target`` of each run that it applies to.
 
-    The process applies to those of the first ``count`` runs that missed the goal, go on and may be
-    corrected. ``descend`` is the kernel of the process **A**. In each of the first ``count`` runs
-    ``converged`` becomes True if **A** converged, and ``iterations`` grows. Return to how many runs
-    the process applied.
+    The process applies to each of the first ``count`` runs that has missed its goal, whose trial
+    goes on, and that may be corrected (``corrects``). ``descend`` is the kernel of the process
+    **A**. In each of the first ``count`` runs ``converged`` becomes True if **A** converged, and
+    ``iterations`` grows. Return to how many runs the process applied.
     """
     slots, slot = batch.slots[0], 0
     for i in range(count):
@@ -249,12 +249,18 @@ def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> int:
 def _correct_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None:
     """Correct the first ``count`` runs: phase 4, *correct*.
 
-    The process **A**, kernel ``descend``, looks for a configuration that hits the goal, and the
-    robot moves there; the movement ends as soon as the hand is in the goal. Without noise a run is
-    corrected once. With noise the movement misses, and the run is corrected until it hits the goal,
-    at most 50 times, unless **A** does not converge. ``ticks``, ``corrections`` and ``iterations``
-    of a run become sums over its corrections, 0 if there is none, and ``target`` becomes the
-    configuration that **A** found last.
+    A run is corrected only if it has missed its goal. The process **A**, kernel ``descend``, looks
+    for a configuration that hits the goal, and the robot moves to this configuration. The movement
+    ends as soon as the hand is in the goal.
+
+    - Without noise, a run is corrected once.
+    - With noise, the movement can miss the goal. Then the run is corrected again, until it hits the
+      goal, **A** does not converge, or 50 corrections were made.
+
+    ``ticks``, ``corrections`` and ``iterations`` of a run become sums over the corrections of the
+    run; ``iterations`` includes those of a process that does not converge. All three become 0 if
+    the run has not missed its goal. ``target`` becomes the last configuration of the last process
+    **A**; it does not change if the run has not missed its goal.
     """
     for i in range(count):
         run = batch.runs[i]

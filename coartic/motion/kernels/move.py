@@ -187,8 +187,8 @@ def check(slots: SlotArrays, count: int, stop_on_arrival: bool, rims: Any, squar
     that can end the movement. Return how many movements have ended. A movement ends
 
     - at its last step;
-    - with the hand within ``rims[0]`` (in length units) of the goal's centre; or
-    - if ``stop_on_arrival`` is True, also with the hand within ``rims[1]`` of the position that the
+    - if the hand is within ``rims[0]`` (in length units) of the goal's centre; or
+    - if ``stop_on_arrival`` is True, and the hand is within ``rims[1]`` of the position that the
       hand has at the target.
 
     ``squares`` are the squares of ``rims`` (:func:`largest_square`).
@@ -273,8 +273,8 @@ def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotReco
 def move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> None:
     """Move each of the first ``count`` runs that is ``acting`` to its ``end``, in place.
 
-    A movement ends on a hit or at its end. With ``stops`` it also ends when the hand is near the
-    position to which its end brings it.
+    A movement ends on a hit or at its end. If ``stops`` is True, a movement also ends when the hand
+    is near the position that it has at the end of the movement.
     """
     slots, slot = batch.slots[0], 0
     for i in range(count):
@@ -290,7 +290,8 @@ def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Perform the next ``action`` of each of the first ``count`` runs, except paths.
 
     :data:`IDLE` lists the actions. ``q``, ``hit``, ``ticks``, ``evaluations`` and ``acting`` change
-    in place. Ticks are 0 if there is no movement. A movement to a target misses it by noise.
+    in place. Ticks are 0 if there is no movement. With noise, the end of a movement to a target is
+    displaced.
     """
     for i in range(count):
         run = batch.runs[i]
@@ -317,7 +318,8 @@ def _corner(run: RunRecord, waypoints: Any, k: int, j: int, noisy: bool) -> Any:
     """Return entry ``j`` of corner ``k`` of a path.
 
     Corner -1 is the present configuration of the run, corner k >= 0 is waypoint k. With noise,
-    ``run.end`` has the displacement of the last waypoint, NaN where nothing moves.
+    ``run.end`` contains the displacement of the last waypoint; an entry is NaN if no waypoint moves
+    this coordinate.
     """
     if k < 0 or (noisy and math.isnan(run.end[j])):
         return run.q[j]
@@ -447,8 +449,8 @@ def follow_paths(
 ) -> None:
     """Follow the path of each of the first ``count`` runs whose action is :data:`FOLLOW`.
 
-    Row ``offset`` + n of ``movements``, shape ``(N, 3)``, belongs to run n. The row has the action,
-    and the start and the end (exclusive) of the run's range of rows in ``waypoints``.
+    Row ``offset`` + n of ``movements``, shape ``(N, 3)``, belongs to run n. The row contains the
+    action, and the start and the end (exclusive) of the run's range of rows in ``waypoints``.
     """
     for i in range(count):
         run = batch.runs[i]

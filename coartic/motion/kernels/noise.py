@@ -7,8 +7,8 @@ The generator has no state. Each number is a function of
 - the coordinate of the configuration.
 
 So no number depends on the order of trials, on the other runs of a batch or on the number of
-threads. Two solutions that are executed with the same seed and the same draw have the same noise
-(*common random numbers*).
+threads. Two solutions that are executed with the same seed and the same draw are executed with the
+same noise (*common random numbers*).
 
 The arguments are hashed one after another by SplitMix64 (Steele, Lea & Flood 2014, *Fast splittable
 pseudorandom number generators*, OOPSLA). The inverse distribution function of the normal
@@ -117,8 +117,8 @@ def _key_of_movement(run: RunRecord) -> Any:
 def miss_target(run: RunRecord, robot: RobotRecord) -> None:
     """Displace the ``end`` of a run's aimed movement by noise, in place.
 
-    Coordinate c moves if its target t_c differs by more than 1e-9 from its present value. It then
-    ends at t_c + s z_c. Other coordinates keep their present values.
+    Coordinate c moves if its target t_c differs by more than 1e-9 from its present value. A
+    coordinate that moves ends at t_c + s z_c. All other coordinates do not change.
     """
     sd, key = robot.model.motor_noise, _key_of_movement(run)
     if robot.grows:
@@ -132,9 +132,9 @@ def miss_target(run: RunRecord, robot: RobotRecord) -> None:
 def displace_path(run: RunRecord, waypoints: Any, robot: RobotRecord) -> None:
     """Draw the noise of a path: the displacement of its last waypoint, in place.
 
-    The displacement becomes the ``end`` of the run. It is s z_c in each coordinate c that any of
-    the ``waypoints``, shape ``(W, dof)``, moves, and NaN in the other coordinates. The ``target``
-    of the run is the last waypoint.
+    The displacement becomes the ``end`` of the run. The displacement is s z_c in each coordinate c
+    that any of the ``waypoints``, shape ``(W, dof)``, moves, and NaN in all other coordinates. The
+    ``target`` of the run is the last waypoint.
     """
     sd, key = robot.model.motor_noise, _key_of_movement(run)
     if robot.grows:

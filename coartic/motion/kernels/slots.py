@@ -1,6 +1,6 @@
 """Data layout with which the compiled kernels move many arms side by side.
 
-- A *run* is a robot that makes a trial. A *batch* has a record for each of its runs.
+- A *run* is a robot that makes a trial. A *batch* contains a record for each of its runs.
 - A *slot* is a column of some arrays. It holds the arm of a run while the arm moves or is corrected
   (structure of arrays).
 
@@ -54,8 +54,9 @@ def _links_for(robot: Robot) -> int:
 def width_of(robot: Robot) -> int:
     """Return the number of entries of a robot's configuration in records of kernels.
 
-    The width is that of a robot with two arms of :func:`_links_for` links. The first ``dof``
-    entries are the robot's configuration; the other entries are unused.
+    The width is the number of base coordinates plus the joints of two arms, each with the number of
+    links for which the kernels are compiled (:func:`_links_for`). The first ``dof`` entries are the
+    robot's configuration; the other entries are unused.
     """
     return BASE_DOF + 2 * _links_for(robot)
 
@@ -141,7 +142,7 @@ def robot_parameters(
 def arm_of(robot: RobotRecord, hand: int) -> Arm:
     """Return the :class:`Arm` of a hand (0 left, 1 right) from a robot's record.
 
-    Its links share memory with the record, which comes from :func:`robot_parameters`.
+    The links of the arm share memory with the record, which comes from :func:`robot_parameters`.
     """
     arm = robot.arms[hand]
     return Arm(arm.first_joint, arm.links[: arm.count], arm.shoulder_x, arm.shoulder_y)
@@ -167,8 +168,9 @@ class Batch(NamedTuple):
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
     """Return a new batch for kernels, with all entries 0.
 
-    The batch has ``count`` records of runs with room for the links of ``robot``, and arrays of 72
-    slots (:data:`SLOTS`). Each run needs a slot, so a kernel moves at most 72 runs at a time.
+    The batch consists of ``count`` records of runs with room for the links of ``robot``, and of
+    arrays of 72 slots (:data:`SLOTS`). Each run needs a slot, so a kernel moves at most 72 runs at
+    a time.
     """
     width = width_of(robot)
     fields = {
@@ -215,7 +217,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     Returns
     -------
     record : dtype
-        The type of the record. A row has a number for each slot.
+        The type of the record. A row contains a number for each slot.
     corrected, moved : slice
         The rows that a correction needs, and the rows that a movement needs.
     """
@@ -368,8 +370,8 @@ def padded_count(count: int) -> int:
 def winding(q: Any, slot: int) -> float:
     """Return an upper bound on the absolute link angles of an arm (in rad).
 
-    The bound is the sum of the sizes of the joint angles of the arm in a slot. ``q`` has a column
-    for each slot.
+    The bound is the sum of the sizes of the joint angles of the arm in a slot. ``q`` contains a
+    column for each slot.
     """
     total = 0.0
     for k in range(len(q) - BASE_DOF):
@@ -381,8 +383,8 @@ def winding(q: Any, slot: int) -> float:
 def have_small_angles(slots: SlotArrays, count: int) -> bool:
     """Return whether all link angles in the first ``count`` slots are certainly below 1e5 rad.
 
-    Angles are absolute, from +x (:func:`winding`). Slots that pad the count are included
-    (:func:`padded_count`).
+    Angles are absolute, from +x (:func:`winding`). Slots beyond ``count`` that are computed to fill
+    a vector are included (:func:`padded_count`).
     """
     large = 0
     for i in range(padded_count(count)):
@@ -415,9 +417,9 @@ _far_chains = _chains_by(cosine, sine)
 def find_positions(slots: SlotArrays, count: int, small_angles: bool) -> None:
     """Fill ``x`` and ``y`` of the first ``count`` slots for the configurations ``q``, in place.
 
-    ``x`` and ``y`` are the positions of shoulder, joints and hand (in length units). Slots that pad
-    the count are filled as well. ``small_angles`` may be True only if all absolute link angles are
-    below 1e5 rad.
+    ``x`` and ``y`` are the positions of shoulder, joints and hand (in length units). Slots beyond
+    ``count`` that are computed to fill a vector are filled as well (:func:`padded_count`).
+    ``small_angles`` may be True only if all absolute link angles are below 1e5 rad.
     """
     if small_angles:
         _near_chains(slots, padded_count(count))

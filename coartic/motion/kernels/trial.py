@@ -48,7 +48,8 @@ def goal_record_type(width: int) -> np.dtype[np.void]:
     """Return the NumPy dtype of the record of one goal in a trial.
 
     Configurations have ``width`` entries. If there are several movements to targets for a goal,
-    each has a record with its ``target`` and ``moved``; all other fields are in the first record.
+    there is a record for each of them. The fields ``target`` and ``moved`` are filled in each of
+    these records, all other fields only in the first record.
     """
     fields = {
         "q": (np.float64, width),  # where the robot is afterwards, in length units and rad
@@ -73,8 +74,8 @@ def goal_record_type(width: int) -> np.dtype[np.void]:
 def set_off(run: RunRecord, q: Any, seed: Any, draw: Any, robot: RobotRecord) -> None:
     """Start the trial of a run at configuration ``q``, shape ``(dof,)``, in place.
 
-    ``going`` becomes True and ``evaluations`` 0. The trial has draw ``draw`` of the motor noise
-    with the 64-bit seed ``seed``. Other fields do not change.
+    ``going`` becomes True and ``evaluations`` 0. The trial is made with draw ``draw`` of the motor
+    noise with the 64-bit seed ``seed``. All other fields do not change.
     """
     fill_row(run.q, q)
     run.going, run.evaluations = True, 0
@@ -88,7 +89,7 @@ def begin(run: RunRecord, number: int, goal: Any) -> None:
 
     ``number`` is the goal's number in the task, from 0. The target becomes the present
     configuration, ``hit`` False and ``corrects`` True. The next action is to check whether the hand
-    is in the goal, or none if the trial has ended.
+    is in the goal; there is no next action if the trial has ended.
     """
     fill_row(run.goal, goal)
     fill_row(run.target, run.q)
@@ -102,7 +103,7 @@ def aim(run: RunRecord, target: Any) -> None:
     """Set the target of a run, in place: phase 2, *aim*.
 
     A coordinate whose entry of ``target`` is NaN does not move. Unless all entries are NaN, the
-    next action becomes :data:`MOVE`. ``target`` has at least ``dof`` entries.
+    next action becomes :data:`MOVE`. The length of ``target`` is at least ``dof``.
     """
     for j in range(len(target)):
         if not math.isnan(target[j]):
@@ -145,10 +146,10 @@ def count_goal(goal: GoalRecord, counts: Any) -> None:
 
 
 class Requests(NamedTuple):
-    """Requested trials of the kernel: N arms, G goals, and M movements for each goal."""
+    """Requested trials of the kernel: N trials, G goals, and M movements for each goal."""
 
     starts: Configs
-    """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` if all arms start alike."""
+    """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` if all trials start alike."""
     hands: Hands
     """Hand for each goal, 0 left or 1 right, shape ``(N, G)``."""
     targets: Configs
@@ -166,8 +167,8 @@ class Requests(NamedTuple):
     waypoints: Configs
     """Waypoints of all paths, shape ``(W, dof)``."""
     goals: Points
-    """Centres of the goals, shape ``(N, G, 2)``, or ``(1, G, 2)`` if all arms have the same
-    goals."""
+    """Centres of the goals, shape ``(N, G, 2)``, or ``(1, G, 2)`` if the goals are the same for all
+    trials."""
     first: int
     """Index in the task of the first goal of ``goals``, from 0."""
     worlds: NDArray[np.uint64]
@@ -198,11 +199,12 @@ def _are_within(targets: Any) -> bool:
 def _reach_lot(
     offset: int, count: int, arms: Any, robot: Any, goals: Any, counts: Any, batch: Any
 ) -> None:
-    """Let ``count`` arms from index ``offset`` on reach for their goals, in place.
+    """Make ``count`` of the requested trials, beginning with trial ``offset``, in place.
 
-    ``count`` is at most the number of runs of ``batch``. ``arms`` are :class:`Requests`, and
-    ``robot`` is a :data:`RobotRecord`. This function fills the records ``goals``, shape ``(N, G,
-    M)``, and adds to ``counts``, shape ``(N, 5)``, which the caller has set to 0.
+    ``arms`` is :class:`Requests`, of which each row is a trial. ``count`` is at most the number of
+    runs of ``batch``, and ``robot`` is a :data:`RobotRecord`. This function fills the records
+    ``goals``, shape ``(N, G, M)``, and adds to ``counts``, shape ``(N, 5)``, which the caller has
+    set to 0.
     """
     for i in range(count):
         n, run = offset + i, batch.runs[i]
@@ -252,7 +254,7 @@ REQUESTED = len(Requests._fields)
 
 @entry
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *arrays: Any) -> None:
-    """Let each arm reach for its goals, a batch of arms at a time.
+    """Make the requested trials, a batch of trials at a time.
 
     ``goals``, ``counts`` and ``rewards`` are the entries of
     :class:`~coartic.motion.trials.TrialRecords`, filled in place; the caller sets ``counts`` to 0.
