@@ -138,8 +138,9 @@ def standings(study: Study) -> pd.DataFrame:
     """Rank the methods of a study by their mean gap.
 
     A method is ranked if it solved all runs on all tasks of :func:`ranked_tasks`, and was asked for
-    the number of trials of :func:`ranking_budget`. A method that solved all runs with another
-    number of trials has a gap, but is not ranked.
+    the number of trials of :func:`ranking_budget`. The number of trials does not matter for a
+    method without trials, or if :func:`ranking_budget` returns None. A method that solved all runs
+    with another number of trials has a gap, but is not ranked.
 
     Returns
     -------
@@ -149,8 +150,8 @@ def standings(study: Study) -> pd.DataFrame:
         the columns of :func:`.ranking` and of :attr:`.Study.methods`. Column ``why`` is the reason
         why a method is not ranked; it is empty for a ranked method. Column ``note`` says
 
-        - how many trials the solved runs of a method from a file made, if a run made another number
-          of trials than was asked for;
+        - for a method from a file: how many trials its solved runs made, if this number differs
+          from the number that was asked for;
         - how many of a method's solutions, found in the paper's world, can fail with motor noise;
         - in a world with noise, how many executions failed.
 

@@ -274,8 +274,9 @@ def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
 def caption_of(table: Table, study: Study) -> str:
     """Return the caption of a table, filled in for a study.
 
-    The caption contains the number of ranked tasks, the name of the best known rewards, and the
-    name of the world if it is not the paper's world.
+    ``{tasks}`` is replaced by the number of ranked tasks, and ``{reference}`` by the name of the
+    best known rewards, if the caption has them. The name of the world is added if it is not the
+    paper's world.
     """
     caption = table.caption.replace("{tasks}", pluralize(len(ranked_tasks(study)), "task"))
     caption = caption.replace("{reference}", reference(study, study.optima))

@@ -202,7 +202,7 @@ def _recompute(task: Any, movements: list[list[Any]]) -> tuple[Any, ...]:
     ValueError if a rule is broken, or if ticks differ from the stored ticks.
 
     Returns reward, letters of the hands, number of corrective movements, and joint-space distance
-    (rad) that idle arms travel, summed over goals. With noise, only None and the letters.
+    (rad) that idle arms travel, summed over goals. With noise, returns None and the letters.
     """
     goals = [movement[0] for movement in movements]
     order = [*range(1, len(task.goals) + 1)]

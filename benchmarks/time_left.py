@@ -125,8 +125,8 @@ class TimeLeft:
 def _group_of(method: str) -> str:
     """Return the name of the group of methods to which a method belongs.
 
-    All methods with shipped results are one group, whose name is empty. Any other method is a group
-    of its own, whose name is the id of the method.
+    All methods of :func:`_shipped_means` are one group, whose name is empty. Any other method is a
+    group of its own, whose name is the id of the method.
     """
     return "" if method in _shipped_means() else method
 

@@ -71,8 +71,9 @@ class Trajectory:
         """Return the rows of ``configurations`` that belong to a goal.
 
         The rows, shape ``(rows, dof)``, go from the hit of the goal before (or from the start) to
-        the hit of this goal, both included. There are no rows if no tick was made. ``goal`` is the
-        number of the goal, from 1. Raises ValueError if the task does not have the goal.
+        the hit of this goal, both included, so that a goal that is hit without a tick has one row.
+        There are no rows if the whole solution makes no tick. ``goal`` is the number of the goal,
+        from 1. Raises ValueError if the task does not have the goal.
         """
         check_limits("goal", goal, 1, len(self.hits))
         start = self.hits[goal - 2] if goal > 1 else 0
