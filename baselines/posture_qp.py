@@ -90,9 +90,9 @@ _SHORTEST = 0.02  # shorter paths get the weight of this length, in length units
 class PostureController(Controller):
     """Go straight in joint space to a posture that hits the current goal.
 
-    An aim is a goal with its hand. The memory of the controller is a dict that maps the aims for the
-    current goal and for the goals ahead to their postures, each of shape ``(dof,)``, in length units
-    (base) and rad (joints).
+    An aim is a goal with its hand. The memory of the controller is a dict that maps the aims for
+    the current goal and for the goals ahead to their postures, each of shape ``(dof,)``, in length
+    units (base) and rad (joints).
     """
 
     def begin(

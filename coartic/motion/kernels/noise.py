@@ -150,10 +150,10 @@ def displace_path(run: RunRecord, waypoints: Any, robot: RobotRecord) -> None:
 def miss_correction(run: RunRecord, robot: RobotRecord) -> None:
     """Displace the ``end`` of a run's corrective movement by noise, in place.
 
-    The target is the configuration **a** that the corrective process found. Coordinate c of the base
-    and the chosen arm ends at a_c + s min(1, L) z_c. Here s is the motor noise, z_c is a standard
-    normal number, and L is the Euclidean distance from the present configuration to **a**. A locked
-    base coordinate and the idle arm end at a_c.
+    The target is the configuration **a** that the corrective process found. Coordinate c of the
+    base and the chosen arm ends at a_c + s min(1, L) z_c. Here s is the motor noise, z_c is a
+    standard normal number, and L is the Euclidean distance from the present configuration to **a**.
+    A locked base coordinate and the idle arm end at a_c.
     """
     sd = robot.model.motor_noise * min(1.0, math.sqrt(squared_distance(run)))
     key, arm = _key_of_movement(run), robot.arms[run.hand]
