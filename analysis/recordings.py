@@ -277,8 +277,8 @@ def _require(frame: pd.DataFrame, columns: list[str], source: str) -> None:
 def _numbers(frame: pd.DataFrame, columns: list[str], source: str) -> Array:
     """Return columns of a frame as an array of float64, shape ``(rows, columns)``.
 
-    Raises CoarticError for a value that is not a real number from -1e5 to 1e5. ``source`` is the
-    name of the frame in the message.
+    Text that spells a number is converted. Raises CoarticError for a value that is not, or does not
+    spell, a real number from -1e5 to 1e5. ``source`` is the name of the frame in the message.
     """
     numbers = np.empty((len(frame), len(columns)))
     for k, name in enumerate(columns):

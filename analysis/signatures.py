@@ -865,9 +865,9 @@ def lean(
     def shares(means: Sequence[Sequence[Array]]) -> Array:
         """Return the leans at the start and at the goal, shape ``(..., 2)``.
 
-        ``means`` contains, for each context, the mean postures of each part of the runs, shape
-        ``(..., 3, k)``. The parts are the odd and the even runs or, with ``toward``, all runs
-        together.
+        ``means[context][part]`` has three mean postures (at the start, at the goal and at the next
+        goal) of k coordinates, shape ``(..., 3, k)``; the first axes are those of resamples. The
+        parts are the odd and the even runs or, with ``toward``, all runs together.
         """
         differences = [one - other for one, other in zip(*means, strict=True)]
         ways = [way]

@@ -89,8 +89,10 @@ class HillClimbing(Method):
     def solve(self, session: Session) -> Result:
         """Make trials until none is left, and return the movements of the best trial.
 
-        With motor noise, return movements to the last centre of the hand sequence of the best
-        trial. The method stops early if the corrective process has failed with all hand sequences.
+        With motor noise, the movements go to a centre instead: the latest centre of the hand
+        sequence that the best trial used. A centre is the point around which trials are drawn. The
+        method stops early if the corrective process has failed with each hand sequence that it may
+        use (with parameter ``sequence`` there is only one).
 
         Raises MethodError if no trial hits every goal.
         """

@@ -373,8 +373,8 @@ class Robot:
     def symbolic_hand_jerk(self, q: Sequence[Any], hand: Hand) -> Any:
         """Return the third time derivative of a hand's position as a CasADi expression.
 
-        The formula is written out by hand, because the Hessians of third derivatives that CasADi
-        makes itself need twice as many operations.
+        The formula is written out by hand. If CasADi differentiates three times itself, the Hessian
+        of the result needs more than twice as many operations.
 
         Parameters
         ----------

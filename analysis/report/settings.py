@@ -153,7 +153,7 @@ def _settings_behind(study: Study, rows: pd.DataFrame) -> str:
 
 
 def _words(study: Study, label: str) -> str:
-    """Return the values of the varied parameters of a setting (its label) in words."""
+    """Describe the values that the setting ``label`` gives to the varied parameters."""
     return describe_values(dict(zip(study.varied.columns, study.varied.loc[label], strict=True)))
 
 

@@ -141,8 +141,8 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 class Display:
     """Context manager that shows on standard error what a command is doing.
 
-    On a terminal, one line is shown and updated. Elsewhere, for example in a file, a new line is
-    printed at most every ten seconds.
+    On a terminal, one line is shown and updated. Elsewhere, for example in a file, progress is
+    printed at most every ten seconds, and once more at the end.
     """
 
     EVERY_S = 10.0

@@ -47,7 +47,7 @@ class DualProcessParameters(Parameters):
 
 
 class CustomParameters(DualProcessParameters):
-    """Parameters of a condition of the paper in which some fields are changed."""
+    """Parameters of a custom condition: one of the paper's, with some fields changed."""
 
     base: Literal["EC1", "EC2", "EC3", "EC4"] = "EC4"
     """The condition of the paper that is changed."""

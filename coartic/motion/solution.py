@@ -309,7 +309,7 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
 
 
 def corrective_movements(hands: str) -> list[Movement]:
-    """Return a corrective movement without a target for each goal.
+    """Return, for each goal, a corrective movement that has no target.
 
     ``hands`` is a hand sequence such as ``"RRLR"``.
     """

@@ -287,7 +287,7 @@ def move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> No
 
 @inlined
 def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Perform the next ``action`` of each of the first ``count`` runs, except paths.
+    """Perform the next ``action`` of each of the first ``count`` runs, unless it is a path.
 
     :data:`IDLE` lists the actions. ``q``, ``hit``, ``ticks``, ``evaluations`` and ``acting`` change
     in place. Ticks are 0 if there is no movement. With noise, the end of a movement to a target is
