@@ -91,8 +91,7 @@ def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
     """Return x and y of a hand (length units) for n configurations, shape ``(n,)`` each.
 
     ``q``, shape ``(dof, n)``, contains a configuration in each column. ``arm`` contains the slice
-    of the joints of the arm, the lengths of the links, and the position of the shoulder on the
-    base.
+    of the arm's joints, the lengths of its links, and the position of its shoulder on the base.
     """
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
@@ -106,9 +105,8 @@ def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
 def stored_task(content: str) -> Any:
     """Return the task of a cell, read from the cell's stored JSON.
 
-    The returned object has attributes that a task file lacks: constants of the motion model
-    (``model``), the start (``q0``), ``locked`` coordinates, ``arms``, and ``digest`` (hash) and
-    ``labels`` of the cell.
+    The task has attributes that a task file lacks: constants of the motion model (``model``), the
+    start (``q0``), ``locked`` coordinates, ``arms``, ``digest`` (hash) and ``labels`` of the cell.
     """
     plain = json.loads(content)
     cell = json.loads(content, object_hook=lambda values: SimpleNamespace(**values))
@@ -158,9 +156,8 @@ def straight_path_points(q: Floats, target: Floats, model: Any) -> Floats:
 def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
     """Return the points of a path from ``q`` through waypoints, shape ``(dof, points)``.
 
-    ``waypoints`` contains a row for each waypoint, shape ``(waypoints, dof)``. The points are
-    spaced by ``model.step`` along the path, beginning at ``q``; the last point is the end of the
-    path.
+    ``waypoints``, shape ``(waypoints, dof)``, contains a row for each waypoint. The points are
+    spaced by ``model.step`` along the path from ``q``; the last point is the end of the path.
     """
     corners = np.array([q, *waypoints])
     sizes = scaled(np.diff(corners, axis=0), model)
