@@ -69,6 +69,40 @@ def level_of(values: ArrayLike) -> float:
     return STRICT_LEVEL if skewed else LEVEL
 
 
+def two_sided_tests(samples: Mapping[Any, ArrayLike], resamples: int | None = None) -> pd.DataFrame:
+    """Test by two-sided bootstrap tests whether means over tasks differ from 0.
+
+    Parameters
+    ----------
+    samples : mapping
+        Maps each name to a sample, with one value for each task, shape ``(tasks,)``.
+    resamples : int, optional
+        Number of bootstrap samples; by default :data:`RESAMPLES_OF_CLAIMS`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each sample, indexed by name: its ``mean``; ``p`` with all tasks, and
+        ``p_without`` the task that favours the sign of the mean most, both corrected over all
+        samples (Holm); and ``differs``, which is True if both are below :func:`level_of` the
+        sample.
+    """
+    values = {name: np.asarray(each, dtype=np.float64) for name, each in samples.items()}
+    means = [each.mean() for each in values.values()]
+    others = [
+        np.delete(each, np.argmax(np.sign(mean_of) * each))
+        for each, mean_of in zip(values.values(), means, strict=True)
+    ]
+    resamples = RESAMPLES_OF_CLAIMS if resamples is None else resamples
+    p, p_without = (
+        holm([bootstrap_test(each, 0.0, "two-sided", resamples=resamples).p for each in tested])
+        for tested in (values.values(), others)
+    )
+    table = pd.DataFrame({"mean": means, "p": p, "p_without": p_without}, index=[*values])
+    levels = [level_of(each) for each in values.values()]
+    return table.assign(differs=table[["p", "p_without"]].max(axis=1) < levels)
+
+
 @dataclass(frozen=True)
 class Finding:
     """Evidence and tests of one claim.

@@ -15,11 +15,11 @@ import pandas as pd
 
 from coartic import load_task
 from coartic.analysis import load
-from coartic.analysis.statistics import bootstrap_test, holm, task_mean
+from coartic.analysis.statistics import task_mean
 from coartic.baselines.random_search import RandomSearch
 from coartic.benchmarks.runner import run_suite
 from coartic.method import Session
-from common.judging import level_of
+from common.judging import two_sided_tests
 
 HERE = Path(__file__).parent
 TRIALS, RESAMPLES = 10_000, 99_999
@@ -65,17 +65,6 @@ def measure_runs(folder):
     return pd.concat([runs, of_given])
 
 
-def two_tests(values):
-    """Return p of the two-sided test that the mean over tasks is not 0, with and without a task.
-
-    The second p is without the task that favours the sign of the mean most.
-    """
-    test = bootstrap_test(values, 0.0, "two-sided", resamples=RESAMPLES)
-    most = (values if test.value > 0 else -values).argmax()
-    fewer = bootstrap_test(np.delete(values, most), 0.0, "two-sided", resamples=RESAMPLES)
-    return test.p, fewer.p
-
-
 def tabulate(runs):
     """Tabulate the mean gains (in ticks) of each cell, with a row for each family.
 
@@ -85,14 +74,13 @@ def tabulate(runs):
     """
     runs = runs.assign(gain=runs.reward - runs.corrective_best)
     gains = runs.pivot_table("gain", ["family", "task"], "cell")
-    rows, tests, levels = {}, [], []
+    rows, samples = {}, {}
     by_run = runs.set_index(["family", "task", "run", "cell"]).unstack("cell")  # noqa: PD010
     same = by_run.hands.table == by_run.hands.centres
     more_of_same = (by_run.gain.table - by_run.gain.centres)[same]
     for family, of_family in gains.groupby("family", sort=False):
         more = of_family.table - of_family.centres
-        tests.append(two_tests(more.to_numpy()))
-        levels.append(level_of(more))
+        samples[family] = more
         row = {"tasks": len(of_family), **of_family.mean().to_dict(), "median_more": more.median()}
         for name, values in {
             "more": more,
@@ -103,9 +91,9 @@ def tabulate(runs):
         of_same = more_of_same[family]
         rows[family] = row | {"same": of_same.mean(), "same_runs": len(of_same)}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("family")
-    table["p"], table["p_without"] = map(holm, zip(*tests, strict=True))
-    sure = table[["p", "p_without"]].max(axis=1) < levels
-    table["verdict"] = np.where(sure, np.where(table.more > 0, "pays", "costs"), "open")
+    tests = two_sided_tests(samples, RESAMPLES)
+    table[["p", "p_without"]] = tests[["p", "p_without"]]
+    table["verdict"] = np.where(tests.differs, np.where(table.more > 0, "pays", "costs"), "open")
     return table
 
 

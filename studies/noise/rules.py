@@ -4,43 +4,10 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis import other_tasks
-from coartic.analysis.statistics import bootstrap_test, holm
-from common.judging import level_of
+from common.judging import two_sided_tests
 
 RESAMPLES = 99_999
 OPEN, DIFFERS = "open", "differs by family"
-
-
-def test_mean(values, resamples):
-    """Make a two-sided test that the mean over tasks is 0."""
-    return bootstrap_test(values, 0.0, "two-sided", resamples=resamples)
-
-
-def without_favourite(values):
-    """Return the values without the largest one in the direction of their mean."""
-    sign = np.sign(np.mean(values))
-    return np.delete(values, np.argmax(sign * values))
-
-
-def tests_of(values, resamples):
-    """Test samples by name with all tasks and without the task that favours the mean most.
-
-    Returns a row for each sample with its mean, both p-values, corrected over all samples (Holm),
-    and whether the mean differs from 0: both are below the level of the sample (1 % if its values
-    are very skewed, else 5 %).
-    """
-    samples = {name: np.asarray(each, dtype=float) for name, each in values.items()}
-    p, p_without = (
-        holm([test_mean(reduce(each), resamples).p for each in samples.values()])
-        for reduce in (np.asarray, without_favourite)
-    )
-    table = pd.DataFrame(
-        {"mean": [each.mean() for each in samples.values()], "p": p, "p_without": p_without},
-        index=[*samples],
-    )
-    levels = [level_of(each) for each in samples.values()]
-    table["differs"] = table[["p", "p_without"]].max(axis=1) < levels
-    return table
 
 
 def judge(differences, resamples=RESAMPLES):
@@ -50,11 +17,11 @@ def judge(differences, resamples=RESAMPLES):
     of a method less that of the learner. A row has the mean with its interval, both p-values and
     the verdict:
 
-    - *ahead* or *behind*: the mean differs from 0 (:func:`tests_of`);
+    - *ahead* or *behind*: the mean differs from 0 (:func:`.two_sided_tests`);
     - *differs by family*: so it does, but the whole interval of a family lies on the other side;
     - *open*: it does not.
     """
-    table = tests_of(differences, resamples)
+    table = two_sided_tests(differences, resamples)
     rows = {}
     for (name, values), test in zip(differences.items(), table.itertuples(), strict=True):
         by_family = {
@@ -76,8 +43,8 @@ def judge_levels(values, resamples=RESAMPLES):
     """Judge mean differences at several levels of noise, corrected over all levels (memory).
 
     ``values`` has one value for each task, by level. The verdict is *more* or *less* if the mean
-    differs from 0 (:func:`tests_of`), and otherwise *open*.
+    differs from 0 (:func:`.two_sided_tests`), and otherwise *open*.
     """
-    table = tests_of(values, resamples)
+    table = two_sided_tests(values, resamples)
     word = np.where(table["mean"] > 0, "more", "less")
     return table.drop(columns="differs").assign(verdict=np.where(table.differs, word, OPEN))

@@ -53,10 +53,9 @@ from settings import (
 )
 
 from coartic.analysis import TwoContexts, figures, load, mean, means
-from coartic.analysis.statistics import bootstrap_test, holm
+from coartic.analysis.statistics import holm
 from coartic.estimates import LEVEL, Estimate, difference_of_means
-from common import judging
-from common.judging import level_of, mean_beyond
+from common.judging import level_of, mean_beyond, two_sided_tests
 from common.writing import write_study
 
 HERE = Path(__file__).parent
@@ -205,22 +204,6 @@ def values_of_pairs(leans, claim):
     )  # fmt: skip
 
 
-def two_tailed(cells):
-    """Return for each cell the larger p of two-tailed tests with all tasks and without one.
-
-    The values of a cell are tested with all tasks, and without the task that favours the sign of
-    their mean most. Both p are corrected over all cells (Holm).
-    """
-    signed = [each * np.sign(each.mean()) for each in cells]
-    others = [np.delete(each, each.argmax()) for each in signed]
-    p, p_without = (
-        holm([bootstrap_test(each, 0.0, "two-sided", resamples=judging.RESAMPLES_OF_CLAIMS).p
-              for each in samples])
-        for samples in (signed, others)
-    )  # fmt: skip
-    return np.fmax(p, p_without)
-
-
 def verdicts(cells):
     """Judge the cells of a claim: a mapping of a cell to its values, one for each task.
 
@@ -250,7 +233,7 @@ def verdicts(cells):
     levels = [level_of(each) for each in values]
     is_sure = np.fmax(p, p_without) < levels
     table["verdict"] = table.all_tasks.where((table.all_tasks == table.without) & is_sure, "open")
-    is_sure = two_tailed(values) < levels
+    is_sure = two_sided_tests(dict(enumerate(values))).differs
     table["verdict_two_tailed"] = np.where(
         is_sure, np.where(means > 0, "holds", "reversed"), "open"
     )
