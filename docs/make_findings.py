@@ -247,36 +247,37 @@ def shipped_gaps(method: str) -> dict[str, float]:
 
 
 MAX_LISTED = 6
-"""Largest number of cells (pairs of world and family) of study ``worlds`` that a sentence lists."""
+"""Largest number of comparisons (pairs of world and family) of study ``worlds`` that a sentence
+lists."""
 
 
 def in_worlds(claim: str) -> str:
     """Return in words in which worlds and families a claim of study ``worlds`` holds.
 
-    A cell is a pair of a world and a family; a claim about the lean has only the family
-    *one-armed*. For each verdict, up to six cells are listed by name; more cells are only counted.
+    A comparison is a pair of a world and a family; a claim about the lean has only the family
+    *one-armed*. For each verdict, up to six comparisons are listed by name; more are only counted.
     """
     judged = table("worlds", "results").dropna(subset="verdict")
     judged = judged[judged.claim == claim]
     has_families = set(judged.group) != {"one-armed"}
     parts = []
     for verdict, words in (("holds", "it holds"), ("reversed", "reversed"), ("open", "open")):
-        cells = judged[judged.verdict == verdict]
-        if cells.empty and verdict != "holds":
+        compared = judged[judged.verdict == verdict]
+        if compared.empty and verdict != "holds":
             continue
         where = {
-            world.title: [family for family in FAMILIES if family in {*cells.group[in_world]}]
+            world.title: [family for family in FAMILIES if family in {*compared.group[in_world]}]
             for name, world in WORLDS.items()
-            if (in_world := cells.world == name).any()
+            if (in_world := compared.world == name).any()
         }
         names = [
             f"{title} ({', '.join(families)})" if has_families else title
             for title, families in where.items()
         ]
-        counted = f" in {len(cells)}"
+        counted = f" in {len(compared)}"
         if verdict == "holds":
-            counted += f" of {len(judged)} {'cells' if has_families else 'worlds'}"
-        listed = f": {', '.join(names)}" if 0 < len(cells) <= MAX_LISTED else ""
+            counted += f" of {len(judged)} {'comparisons' if has_families else 'worlds'}"
+        listed = f": {', '.join(names)}" if 0 < len(compared) <= MAX_LISTED else ""
         parts.append(words + counted + listed)
     return f"{'; '.join(parts)}."
 

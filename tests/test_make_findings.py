@@ -108,7 +108,7 @@ def test_where_a_claim_does_not_hold_in_other_worlds_is_said_in_words(monkeypatc
     judged.loc[4:6, "verdict"] = ["open", "open", "reversed"]
     monkeypatch.setattr(make_findings, "table", lambda *_: judged)
     assert make_findings.in_worlds("ahead") == (
-        "it holds in 6 of 9 cells: the paper's (one-armed, two-armed, aligned), maximum norm "
+        "it holds in 6 of 9 comparisons: the paper's (one-armed, two-armed, aligned), maximum norm "
         "(one-armed), base weight 4 (two-armed, aligned); reversed in 1: base weight 4 "
         "(one-armed); open in 2: maximum norm (two-armed, aligned)."
     )
