@@ -150,8 +150,9 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
     - On a task for one arm, the result is always True.
     - For the learner, the result is ``modify_other`` of its exploration condition: True if the
       learner adds exploration noise to the idle arm.
-    - For any other method, the result is the value of its parameter ``idle_arm``, such as that of
-      random search. It is True if the method does not have this parameter.
+    - For any other method with a parameter ``idle_arm``, such as random search, the result is the
+      value of this parameter.
+    - For a method without this parameter, the result is True.
     """
     run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
@@ -226,9 +227,9 @@ def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
     Returns
     -------
     float
-        The mean difference, in the unit of the signature. Only the hand sequences are used for
-        which :func:`with_control` returns runs of random search. The mean is NaN if there is no
-        such hand sequence.
+        The mean difference, in the unit of the signature. Hand sequences for which
+        :func:`with_control` returns no runs of random search are left out. The mean is NaN if no
+        hand sequence is left.
 
     Raises
     ------
@@ -252,7 +253,7 @@ def selects(study: Study, label: str) -> bool:
 
 
 def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """Return the runs of random search that control a comparison of two contexts, or None.
+    """Return the runs of random search as a control of a comparison of two contexts.
 
     Parameters
     ----------

@@ -145,7 +145,7 @@ def inline(name: object) -> str:
 
 
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
-    """Return names of columns, passed as a string or as an iterable, as a list.
+    """Return one or several names of columns as a list.
 
     A string is treated as one name. Raises CoarticError if ``names`` is neither a string nor an
     iterable of hashable objects. ``what`` is the name of the argument in the error message.
@@ -400,7 +400,7 @@ def means(
         A row for each group, in the order in which the groups first appear in ``frame``. It has
 
         - the columns in ``by``;
-        - ``rows``: the number of rows of the group, with those whose entries are NaN;
+        - ``rows``: the number of rows of the group, including rows with NaN in ``columns``;
         - for each column ``x`` in ``columns``: the mean ``x``, and the ends ``x_low`` and
           ``x_high`` of its 95 % interval (:func:`coartic.analysis.mean`), in the unit of the
           column. The mean is NaN without values, and the ends are NaN with fewer than five values.

@@ -44,7 +44,7 @@ have the same number of targets."""
 
 
 def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Return the pairs of a run and a target that it reached, ordered by running time.
+    """Return the pairs of a run and a reached target, ordered by running time.
 
     Parameters
     ----------

@@ -742,7 +742,7 @@ difference is computed."""
 
 
 class Lean(NamedTuple):
-    """Leans at a shared goal and at the start of its movement, as fractions (:func:`lean`)."""
+    """Leans of postures at a shared goal and at the start, as fractions (:func:`lean`)."""
 
     more: Estimate
     """Lean at the shared goal minus lean at the start, with its interval for other runs. ``n`` is a
@@ -1095,7 +1095,8 @@ class TwoContexts:
     >>> study = coartic.analysis.load("shipped").worlds[""]  # doctest: +SKIP
     >>> runs = [study.executed(task, "dual-process/EC1") for task in ("ascending", "descending")]
     ... # doctest: +SKIP
-    >>> TwoContexts(*runs, 1, "right", part="joints").lean.more.value  # doctest: +SKIP
+    >>> contexts = TwoContexts(*runs, 1, "right", part="joints")  # doctest: +SKIP
+    >>> round(contexts.lean.more.value, 3)  # doctest: +SKIP
     -0.056
     """
 

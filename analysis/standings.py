@@ -44,7 +44,7 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 
 
 NOT_HERE = "no runs in this world"
-"""Why a method is not ranked that has runs only in other worlds of the folder."""
+"""Reason for not ranking a method that has runs only in other worlds of the folder."""
 ESTIMATES, COUNTS = ("gap", "share", "noisy_gap"), ("tasks", "runs", "failed")
 """Columns of :func:`.ranking` that are estimates with an interval, and columns that are counts."""
 _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "parameters", "information"]
