@@ -47,10 +47,9 @@ _import, __dir__ = import_lazily(__name__, _MODULES)
 def __getattr__(name: str) -> Any:
     """Import an attribute of the package when it is first used, and return it.
 
-    The functions named in :data:`_CHECKED` check the types and limits of their arguments if they
-    are imported from this package. Modules of the package import the same functions from the
-    modules in :data:`_MODULES`, and thus without these checks. Raises AttributeError for an unknown
-    name.
+    A function named in :data:`_CHECKED` is wrapped, so that it checks the types and limits of its
+    arguments. Modules inside the package import the same function without this check, from its own
+    module (:data:`_MODULES`). Raises AttributeError for an unknown name.
     """
     value = _import(name)
     if name in _CHECKED:

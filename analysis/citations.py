@@ -21,7 +21,7 @@ from coartic.runs.plan import world_title
 THE_PAPER = "shah2013"
 STATISTICS = "efron1993", "davison1997", "holm1979", "chung2013", "schuirmann1987", "cohen1988"
 THEORIES = "harris1998", "todorov2002"
-"""Works on theories of motor control that the pages compare with the methods."""
+"""Keys of works on theories of motor control, with which the documentation compares the methods."""
 
 
 @cache
@@ -42,31 +42,33 @@ def bibliography(
 ) -> str:
     """Return BibTeX entries for the software, the paper, and the works behind the methods.
 
-    There is one entry for each work, even if several methods cite it. A comment line before the
-    entry names the methods for which the work is cited, or another reason, such as ``the paper``.
+    There is one entry for each work of ``references.bib``, even if several methods cite it, and an
+    entry for each method from a file that declares a citation as text. A comment line before each
+    entry names the methods that cite the work, or gives another reason, such as ``the paper``.
 
     Parameters
     ----------
     methods : mapping of str to MethodInfo
-        Maps the id of each method to its declaration. A method from a file is cited as its author
-        declares. If the author declares no citation, a comment line says so.
+        Maps the id of each method to its declaration. If a method from a file declares no citation
+        and no works, or works that are not in ``references.bib``, a comment line says so.
     analysis : bool
-        True to add the works on which statistics and signatures are based, and the theories of
-        motor control that the pages compare with the methods.
+        True to add works on the statistics of the analysis, and works on theories of motor control
+        (:data:`STATISTICS`, :data:`THEORIES`).
     environment : mapping, optional
         Environment of a results folder (:attr:`.Study.made_with`). The version and the commit of
-        coartic in this environment are cited. By default the version of this program is cited.
+        coartic in this environment are cited. By default, the version of coartic that is running is
+        cited.
     imports : mapping, optional
         Maps the id of each method from a file to the names and versions of the packages that the
         file imports (:attr:`.Study.imports`). These packages are named in a comment line.
     worlds : sequence of str
-        Worlds of the runs (:attr:`.Study.worlds`); the empty string is the paper's world. If at
-        least one world is not the paper's world, the note of the software's entry names all worlds.
+        Names of the worlds of the runs (:attr:`.Study.worlds`); the empty string is the paper's
+        world. If one of them is another world, the entry of the software names all worlds.
 
     Returns
     -------
     str
-        The entries and comment lines, ready for a ``.bib`` file.
+        The entries and comment lines, as the content of a ``.bib`` file.
     """
     made_with = environment or {}
     note = f"Version {made_with.get('coartic') or __version__}"
@@ -120,14 +122,14 @@ def bibliography(
 def _misc(key: str, **fields: str) -> str:
     """Return a BibTeX entry of type ``@misc``.
 
-    Each keyword argument is a field of the entry, which is written on a line of its own.
+    Each keyword argument is a field of the entry. Each field is on a line of its own.
     """
     lines = [f"  {name} = {{{value}}}," for name, value in fields.items()]
     return "\n".join([f"@misc{{{key},", *lines, "}"])
 
 
 def _comment(text: str) -> str:
-    """Return text as a comment line for a BibTeX file.
+    """Return a string as a comment line for a BibTeX file.
 
     Each ``@`` is replaced by ``(at)``, because BibTeX would read it as the beginning of an entry.
     """

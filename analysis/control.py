@@ -1,21 +1,21 @@
-"""Compare signatures of coarticulation with those of random search, their control.
+"""Compare signatures of coarticulation with those of random search, which is the control.
 
-Selection by reward is enough to produce signatures of coarticulation. Therefore signatures of a
+Selection by reward is enough to produce signatures of coarticulation. Therefore the signatures of a
 method that selects its solution from trials are compared with those of random search
 (:mod:`coartic.baselines.random_search`), which is the paper's learner without its memory. The
-compared runs have
+compared runs of the method and of random search
 
-- the same hand sequence. There is one exception: the signature ``hand`` measures the choice of
-  hands itself. It is compared with all runs of the form of random search that tries all hand
+- have the same hand sequence. There is one exception: the signature ``hand`` measures the choice of
+  hands itself. For this signature, the control is the form of random search that tries all hand
   sequences;
-- the same treatment of the idle arm, if possible. A learner adds exploration noise to the idle arm
-  if its condition has ``modify_other`` (EC2 and EC4). If the folder contains no runs of random
-  search without noise on the idle arm, random search with such noise is used instead;
-- the same number of trials;
-- a solution. A solved run that did not improve on the corrective process is compared, too; its
-  signature is often 0.
+- treat the idle arm in the same way, if possible. A learner adds exploration noise to the idle arm
+  if its condition has ``modify_other`` (EC2 and EC4). If the method adds no such noise, and the
+  folder contains no random search without such noise, random search with the noise is used;
+- make the same number of trials;
+- are solved. Solved runs that are no better than the corrective process alone are included.
 
-The test is the one-tailed exchange test of the difference between the means over runs.
+Table ``signatures`` (:func:`.list_signatures`) has the p-values of the one-tailed exchange test of
+the difference between the means over runs.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import HANDS, Array
 
 MIN_SHARE = 0.1
-"""Smallest fraction of a method's solved runs on a task that must have a hand sequence, so that the
-runs with this hand sequence are compared with random search."""
+"""A hand sequence is compared with random search only if at least this fraction of the method's
+solved runs on the task have this hand sequence."""
 
 
 def with_control(
@@ -59,26 +59,28 @@ def with_control(
     Returns
     -------
     dict of str to (ndarray, ndarray)
-        Maps each hand sequence, such as ``"RRLR"``, to two arrays of the signature, in its unit:
-        the values of the method's runs, shape ``(n,)``, and the values of the runs of random search
-        (:func:`control_of`), shape ``(m,)``. The runs of both have this hand sequence and the same
-        number of trials.
+        Maps each hand sequence, such as ``"RRLR"``, to two arrays of values in the unit of the
+        signature: one for the method's runs, shape ``(n,)``, and one for the runs of random search
+        (:func:`control_of`), shape ``(m,)``. All these runs have this hand sequence, and both
+        methods make the same number of trials.
 
         - A hand sequence is included if at least a tenth of the method's solved runs have both this
           sequence and a value of the signature. The most frequent sequence comes first.
         - Runs in which the signature is NaN are left out of both arrays.
         - The second array is empty if the folder contains no such runs of random search.
-        - Signature ``hand`` has at most one key, the empty string, for all hand sequences together.
-        - Only the first 500 solved runs of each method are used.
+        - For signature ``hand``, the only key is the empty string, which stands for all hand
+          sequences together. On a task for one arm, the dict is then empty.
+        - Only the first 500 solved runs of the method, and of random search, are used.
 
     Raises
     ------
     CoarticError
-        The folder has no runs of the method on the task, or runs cannot be executed again
-        (:meth:`.Study.executed`).
+        The signature is unknown, the study has several worlds, the folder has no runs of the method
+        on the task, or runs cannot be executed again (:meth:`.Study.executed`).
 
     Examples
     --------
+    >>> study = coartic.analysis.load("shipped").worlds[""]  # doctest: +SKIP
     >>> values, control = with_control(study, "first", "ascending", "dual-process/EC1")["RRR"]
     ... # doctest: +SKIP
     """
@@ -97,12 +99,11 @@ def with_control(
 def signature_by_hands(study: Study, signature: str, task: str, label: str) -> dict[str, Array]:
     """Return a dict that maps each hand sequence to the signature of its runs.
 
-    The hand sequences are in alphabetical order. Each array has shape ``(n,)`` and is in the unit
-    of the signature. The array contains a value for each run with this hand sequence in which the
-    signature is not NaN, among the first 500 solved runs of the method on the task. The signature
-    ``hand`` measures the choice of hands itself: its only key is the empty string, for the runs
-    with all hand sequences together. The dict is empty if no run has the signature. The result is
-    cached: do not change it.
+    The keys are in alphabetical order. Each value is an array of shape ``(n,)``, in the unit of the
+    signature, with an entry for each run that has this hand sequence. Runs in which the signature
+    is NaN are left out. Only the first 500 solved runs of the method on the task are used. For
+    signature ``hand``, the only key is the empty string, which stands for all hand sequences
+    together. The dict is empty if no run has the signature. It is cached: do not change it.
     """
     values = study.signature(signature, task, label).to_numpy(np.float64)
     hands = np.array(study.cells[task, label].hands.fillna("").tolist(), dtype=object)
@@ -114,10 +115,10 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
 
 
 def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool = False) -> str:
-    """Return the label of the random search that controls a method on a task.
+    """Return the label of the random search that is the control of a method.
 
-    The result is a form of random search with the same number of trials as the method. If there are
-    several such forms, the one that treats the idle arm as the method does is preferred.
+    This form of random search has the hand sequence ``hands``, and as many trials as the method. If
+    there are several such forms, the one that treats the idle arm as the method does is preferred.
 
     Parameters
     ----------
@@ -125,11 +126,11 @@ def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool =
     task, label : str
         Name of the task, and label of the method.
     hands : str
-        Hand sequence that random search must have, such as ``"RRLR"``. The empty string stands for
-        the form of random search that tries all hand sequences.
+        Hand sequence of all solved runs of random search, such as ``"RRLR"``. The empty string
+        stands for the form of random search that tries all hand sequences.
     alike : bool
-        True to accept only random search that treats the idle arm as the method does. If it is
-        False and there is no such random search, random search that explores both arms is accepted.
+        True to accept only random search that treats the idle arm as the method does. False to
+        accept random search that explores both arms, too, if there is no other.
 
     Returns
     -------
@@ -144,12 +145,14 @@ def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool =
 
 @lru_cache(maxsize=4_096)
 def explores_idle_arm(study: Study, task: str, label: str) -> bool:
-    """Return True if a method adds exploration noise to the idle arm on a task.
+    """Return whether a method counts as exploring with the idle arm on a task.
 
     - On a task for one arm, the result is always True.
-    - For the learner, the result is ``modify_other`` of its exploration condition.
-    - For any other method, such as random search, the result is the value of its parameter
-      ``idle_arm``, or True if the method does not have this parameter.
+    - For the learner, the result is ``modify_other`` of its exploration condition: True if the
+      learner adds exploration noise to the idle arm.
+    - For any other method with a parameter ``idle_arm``, such as random search, the result is the
+      value of this parameter.
+    - For a method without this parameter, the result is True.
     """
     run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
@@ -165,17 +168,19 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
 def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
     """Return a dict that maps forms of random search on a task to their labels.
 
-    A form is a method ``random-search...`` with its setting. Each key is a tuple of
+    A form is a method whose algorithm is ``random search``, with its setting. Each key is a tuple
+    of
 
-    - the hand sequence; the empty string if the form tries all hand sequences;
-    - the number of trials;
-    - True if the form explores the idle arm, otherwise False.
+    - the hand sequence; the empty string for ``random-search/hands``, which tries all hand
+      sequences;
+    - the number of trials (:func:`_most_trials`);
+    - True if the form explores the idle arm (:func:`explores_idle_arm`), otherwise False.
 
     If several forms have the same key, the first of them is used. A form is left out if
 
     - it has more than one stage (parameter ``stages``);
     - it has no solved run on the task;
-    - its solved runs have different hand sequences, although it does not try all by design.
+    - it is not ``random-search/hands``, and its solved runs have different hand sequences.
     """
     labels = dict[tuple[str, float, bool], str]()
     of_search = study.methods[study.methods.algorithm == "random search"]
@@ -196,7 +201,7 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
 
 @lru_cache(maxsize=4_096)
 def _most_trials(study: Study, task: str, label: str) -> float:
-    """Return the largest number of trials of a method's runs on a task.
+    """Return the largest number of trials that a run of a method made on a task.
 
     The result is 0 for a method without trials.
     """
@@ -206,9 +211,9 @@ def _most_trials(study: Study, task: str, label: str) -> float:
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
     """Return the mean difference between a method's signature and that of random search.
 
-    From the signature of each run of the method, the mean signature of random search with the same
-    hand sequence is subtracted. (For signature ``hand``, random search tries all hand sequences.)
-    The result is the mean of these differences over runs.
+    For each run of the method, the difference is the signature of the run minus the mean signature
+    of random search with the same hand sequence. (For signature ``hand``, random search tries all
+    hand sequences.) The result is the mean of these differences over runs.
 
     Parameters
     ----------
@@ -222,14 +227,15 @@ def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
     Returns
     -------
     float
-        The mean difference, in the unit of the signature. Only runs with a hand sequence for which
-        :func:`with_control` returns runs of random search are used. The mean is NaN if there are no
-        such runs.
+        The mean difference, in the unit of the signature. Hand sequences for which
+        :func:`with_control` returns no runs of random search are left out. The mean is NaN if no
+        hand sequence is left.
 
     Raises
     ------
     CoarticError
-        The folder has no runs of the method on the task, or runs cannot be executed again.
+        The signature is unknown, the study has several worlds, the folder has no runs of the method
+        on the task, or runs cannot be executed again.
     """
     pairs = with_control(study, signature, task, label).values()
     excess = [values - control.mean() for values, control in pairs if len(control)]
@@ -237,17 +243,17 @@ def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
 
 
 def selects(study: Study, label: str) -> bool:
-    """Return True if a method selects its solution from trials, and is not random search.
+    """Return whether a method, other than random search, can select its solution from trials.
 
-    A method can select its solution if it declares that it uses the reward of each trial, and if at
-    least one of its runs made more than one trial.
+    A method can do so if it declares that it uses the reward of each trial, and if at least one of
+    its runs made more than one trial. The result is False for random search itself.
     """
     method = study.methods.loc[label]
     return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
 
 
 def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """Return the runs of random search that control a comparison of two contexts, or None.
+    """Return the runs of random search as a control of a comparison of two contexts.
 
     Parameters
     ----------
@@ -259,8 +265,8 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
     Returns
     -------
     TwoContexts or None
-        Runs of random search on the same two tasks, at the same goal, with the same hand and the
-        same part of the posture. Random search makes the same number of trials as the method. On
+        Runs of random search on the same two tasks, compared at the same goal, with the same hand
+        and in the same part of the posture. Random search makes as many trials as the method. On
         each task, it uses the hand sequence that is most frequent in the method's runs. Only the
         first 500 solved runs on each task are used. The result is None if
 
@@ -271,7 +277,8 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
     Raises
     ------
     CoarticError
-        Runs of random search cannot be executed again (:meth:`.Study.executed`).
+        The study has several worlds, or runs of random search cannot be executed again
+        (:meth:`.Study.executed`).
     """
     if not selects(study, contexts.method):
         return None
@@ -291,11 +298,13 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 
 
 def shared_goals(study: Study, label: str, *, part: Part = "all") -> Iterator[TwoContexts]:
-    """Yield a comparison of a method's runs for each goal that two individual tasks share.
+    """Yield a comparison of a method's runs for each goal that two tasks share.
 
-    Two tasks share goals if they begin with the same goals (:func:`.context_pairs`). There is one
-    comparison for each pair of tasks, for each shared goal, and for each hand with which the method
-    hits this goal on both tasks. Only the first 500 solved runs on each task are used.
+    Two tasks share goals if they begin with the same goals (:func:`.context_pairs`). Only the tasks
+    that a report shows individually are used (:attr:`.Study.individual_tasks`). There is one
+    comparison for each pair of tasks, for each shared goal, and for each hand with which at least
+    one run on each of the two tasks hits this goal. Only the first 500 solved runs of the method on
+    each task are used.
 
     Parameters
     ----------
@@ -327,8 +336,9 @@ def shared_goal(study: Study, *, part: Part = "all") -> TwoContexts | None:
     """Return the first comparison of :func:`shared_goals` for the methods of a study, or None.
 
     The methods are tried in this order: the paper's learner, methods from files, methods that
-    represent their algorithms, and then all other methods. ``part`` names the coordinates of the
-    posture that are compared (:class:`.TwoContexts`). The result is cached.
+    represent their algorithms (:func:`.headline_methods`), and then all other methods. ``part``
+    names the coordinates of the posture that are compared (:class:`.TwoContexts`). The result is
+    cached.
     """
     rows = study.methods
     subjects = rows.index[rows.is_learner], rows.index[~rows.built_in]

@@ -5,15 +5,16 @@ each run, and the columns
 
 - ``method`` and ``task``;
 - ``reward``: negative ticks, NaN for a failed run;
-- ``mean_ticks``, only for runs in a world with noise, whose ``reward`` is NaN;
+- ``mean_ticks`` and ``motor_noise``, only for runs in a world with noise, whose ``reward`` is NaN;
 - ``best_known``: the best known reward of the task, negative ticks;
 - ``corrective_best``, only for shares: the reward of the corrective process alone with its best
   hands, negative ticks.
 
-The functions compare the *value* of each run: its reward, or minus its ``mean_ticks`` in a world
-with motor noise (:func:`.run_values`). If you have the costs of an ``Objective``, use their
-negatives as rewards. The functions raise CoarticError for a frame with wrong values, and for a
-ranking of runs in different worlds.
+Gaps, shares and rankings are computed from the *value* of each run: its reward, or minus its
+``mean_ticks`` in a world with motor noise (:func:`.run_values`). If you have the costs of an
+``Objective``, use their negatives as rewards. The functions raise CoarticError for a frame with
+wrong values. Functions with a result for each method also raise CoarticError if the runs are in
+different worlds.
 """
 
 from __future__ import annotations
@@ -39,15 +40,16 @@ ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
 MIN_GAIN = 0.01
 """Smallest possible gain for which a share is computed in a world with noise, as a fraction of the
-best known reward. A smaller gain is about as large as the standard errors of the two mean rewards
-between which it lies."""
+best known reward. The possible gain is the difference between the best known reward and the reward
+of the corrective process alone. A smaller gain is about as large as the standard errors of these
+two mean rewards."""
 DUPLICATE = (
     "a run must not occur twice (if runs of two sources have the same numbers, add a column seed, "
     "folder or run_id; number the draws of a bootstrap in a column run)"
 )
 _SOURCES = ("folder", "seed", "run_id", "run")
-"""Columns that together identify a run among the runs of one method on one task. A frame can lack
-some or all of them."""
+"""Columns that together identify a run among the runs of one method on one task. Each of these
+columns is optional."""
 
 
 def checked(
@@ -61,12 +63,13 @@ def checked(
 
     If ``numbers`` contains ``reward``, the result has further columns:
 
-    - ``value``: the value of the run (:func:`.run_values`), from ``reward`` and, if the frame has
-      it, ``mean_ticks``;
+    - ``mean_ticks`` and ``motor_noise``, if the frame has them, as columns of numbers;
+    - ``value``: the value of the run (:func:`.run_values`), computed from ``reward`` and
+      ``mean_ticks``;
     - ``is_noisy``: True for a run whose ``motor_noise`` is above 0; False for all runs if the frame
-      does not have this column;
-    - ``status``, if the frame contains this column. The status is checked against the value: for a
-      run with status ``ok``, the reward or the mean ticks must be given (in noise both can be
+      does not have ``motor_noise``;
+    - ``status``, if the frame has it. The status is checked against the value: for a run with
+      status ``ok``, the reward or the mean ticks must be given (for a run with noise both can be
       missing, :func:`.judge`); for a run with any other status, both must be missing.
 
     Parameters
@@ -74,7 +77,8 @@ def checked(
     frame : DataFrame
         The user's frame.
     numbers : sequence of str
-        Columns of numbers. They are returned as float64, with NaN for missing numbers.
+        Columns of numbers, or of text that spells numbers. They are returned as float64, with NaN
+        for missing numbers.
     names : sequence of str
         Columns without missing values. They are returned as they are.
     others : sequence of str
@@ -83,15 +87,16 @@ def checked(
     Returns
     -------
     DataFrame
-        The checked columns. The levels of the index have no names, because such a name could also
-        be the name of a column.
+        The checked columns, with the index of ``frame``. The levels of the index have no names,
+        because such a name could also be the name of a column.
 
     Raises
     ------
     CoarticError
-        ``frame`` is not a DataFrame, it has no rows, a column is missing, a value of ``names`` is
-        missing, a value of ``numbers`` is not a finite number or NaN, or ``status`` contradicts the
-        value.
+        - ``frame`` is not a DataFrame, it has no rows, or a column is missing.
+        - A value in a column of ``names`` is missing.
+        - A value in a column of ``numbers`` is neither a finite number nor missing (NaN).
+        - The status of a run contradicts its value.
     """
     if not isinstance(frame, pd.DataFrame):
         raise CoarticError(f"the frame is a {type(frame).__name__}; it must be a pandas.DataFrame")
@@ -140,10 +145,10 @@ def inline(name: object) -> str:
 
 
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
-    """Return an argument that names columns as a list of names.
+    """Return one or several names of columns as a list.
 
-    A string is treated as one name. Raises CoarticError if the argument is neither a string nor an
-    iterable of names. ``what`` is the name of the argument in the error message.
+    A string is treated as one name. Raises CoarticError if ``names`` is neither a string nor an
+    iterable of hashable objects. ``what`` is the name of the argument in the error message.
     """
     if isinstance(names, str):
         return [names]
@@ -173,28 +178,28 @@ def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str)
 
 
 def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
-    """Add columns ``gap`` and, if the columns have :data:`ZERO`, ``share`` to checked columns.
+    """Return a copy of checked columns with new columns ``gap`` and ``share``.
 
     gap = (best known - value) / |best known|
     share = (value - zero) / (best known - zero),
 
-    where zero is the value in column :data:`ZERO`. Both are fractions. Both are NaN if the value or
-    the best known reward is NaN. The share is also NaN if
+    where zero is the reward in column :data:`ZERO`. Gap and share are fractions, and are NaN if the
+    value or the best known reward is NaN. Without column :data:`ZERO` there is no column ``share``.
+    The share is also NaN if
 
     - zero is NaN, or is not below the best known reward;
-    - in a world with noise, zero is on average less than 1 % below the best known reward
-      (:data:`MIN_GAIN`), so that the share would be a matter of chance.
-
-    The result is a copy.
+    - in a world with noise, the mean of zero over the runs with this best known reward is less than
+      1 % below the best known reward (:data:`MIN_GAIN`), so that the share would be a matter of
+      chance.
 
     Raises
     ------
     CoarticError
         - A value or a best known reward is above 0.
         - A best known reward is 0.
-        - Without noise, a reward is above the best known reward by more than rounding
-          (:data:`NEGLIGIBLE`), or :data:`ZERO` is above the best known reward. In a world with
-          noise, both can happen by chance and are allowed.
+        - Without noise, a reward is above the best known reward by more than a rounding error
+          (:data:`NEGLIGIBLE`), or zero is above the best known reward. In a world with noise, both
+          can happen by chance and are allowed.
     """
     for name in ("reward", "value", "best_known"):
         sign = "a reward must be minus the ticks; for a cost, such as best_cost, use the negative"
@@ -241,9 +246,9 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A copy of the columns that are needed, with these new or changed columns:
+        A copy of the columns that are needed (:func:`checked`), with these new or changed columns:
 
-        - ``value``, ``gap``, and ``share`` if the frame has ``corrective_best``;
+        - ``gap``, and ``share`` if the frame has ``corrective_best`` (:func:`_with_gaps`);
         - ``method``: name of the method. It includes the setting if the method occurs in the frame
           with several settings;
         - ``task``: number of the task, from 0, in the alphabetical order of the names of tasks;
@@ -255,9 +260,10 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        The frame is wrong (:func:`checked`, :func:`_with_gaps`), it has runs in several worlds
-        (column ``world``), or a task has more than one ``best_known`` or, without noise, more than
-        one :data:`ZERO`.
+        - The frame is wrong (:func:`checked`, :func:`_with_gaps`).
+        - It has runs in several worlds (column ``world``).
+        - A task has more than one ``best_known`` or, without noise, more than one
+          ``corrective_best``.
     """
     _refuse_worlds(frame)
     existing = [*getattr(frame, "columns", ())]
@@ -283,7 +289,7 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 
 
 def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
-    """Return :func:`scored` of a frame, in which each run must have one row.
+    """Check a frame with one row for each run, and return it as :func:`scored` does.
 
     Raises CoarticError if the frame is wrong (:func:`scored`), or if two rows belong to one run.
     """
@@ -313,10 +319,13 @@ def relative_gaps(frame: pd.DataFrame) -> pd.Series:
     Raises
     ------
     CoarticError
-        - The frame has no rows, or a column is missing.
+        - The frame is not a DataFrame, it has no rows, or a column is missing.
         - A value is neither a finite number nor missing (NaN), or a reward is above 0 (rewards are
           negative, costs positive).
-        - A reward without noise is above the best known reward, or a best known reward is 0.
+        - Without noise, a reward is above the best known reward.
+        - A best known reward is 0.
+        - The frame has a column ``status``, which is ``ok`` for a run without noise and without a
+          reward, or is not ``ok`` for a run with a reward or mean ticks.
 
     Examples
     --------
@@ -338,9 +347,9 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     frame : DataFrame
         A row for each run, with columns ``reward``, ``best_known`` and ``corrective_best``, in
         negative ticks. ``corrective_best`` is the reward of the corrective process alone with its
-        best hands. For a task with more than 4,096 hand sequences, ``load(folder).runs`` has the
-        reward with the task's initial hands instead. Runs in a world with motor noise are given as
-        in :func:`relative_gaps`.
+        best hands. (For a task with more than 4,096 hand sequences, column ``corrective_best`` of
+        ``load(folder).runs`` contains the reward with the task's initial hands instead.) For runs
+        in a world with motor noise, the columns are as in :func:`relative_gaps`.
 
     Returns
     -------
@@ -349,13 +358,14 @@ def shares(frame: pd.DataFrame) -> pd.Series:
         ``frame``. The share is negative if the corrective process alone is better than the run. It
         is NaN if one of the three rewards is NaN, or if nothing can be gained. Nothing can be
         gained if the best known reward is not above ``corrective_best`` or, in a world with noise,
-        is above it by less than 1 % of the best known reward.
+        if it is above ``corrective_best`` by less than 1 % of the best known reward, on average
+        over the runs with this best known reward.
 
     Raises
     ------
     CoarticError
-        A column is missing or a reward is wrong (:func:`relative_gaps`), or ``corrective_best`` is
-        above the best known reward.
+        A column is missing or a reward is wrong (:func:`relative_gaps`), or, without noise,
+        ``corrective_best`` is above the best known reward.
 
     Examples
     --------
@@ -378,8 +388,8 @@ def means(
     frame : DataFrame
         A row for each task or for each run. The rows of a group are a sample of independent values.
     by : str or sequence of str
-        Names of the columns whose values define the groups. Rows with NaN in one of these columns
-        form groups of their own.
+        Names of the columns whose values define the groups. NaN counts as a value, so that rows
+        with NaN form groups, too.
     columns : str or sequence of str
         Names of the columns of numbers whose means are computed. Entries that are NaN are left out
         of a mean.
@@ -390,7 +400,7 @@ def means(
         A row for each group, in the order in which the groups first appear in ``frame``. It has
 
         - the columns in ``by``;
-        - ``rows``: the number of rows of the group;
+        - ``rows``: the number of rows of the group, including rows with NaN in ``columns``;
         - for each column ``x`` in ``columns``: the mean ``x``, and the ends ``x_low`` and
           ``x_high`` of its 95 % interval (:func:`coartic.analysis.mean`), in the unit of the
           column. The mean is NaN without values, and the ends are NaN with fewer than five values.
@@ -398,8 +408,11 @@ def means(
     Raises
     ------
     CoarticError
-        The frame has no rows, a column is missing, a value of ``columns`` is neither a finite
-        number nor NaN, or ``by`` is empty.
+        - ``frame`` is not a DataFrame, it has no rows, or a column is missing.
+        - A value in ``columns`` is neither a finite number nor NaN.
+        - ``by`` is empty, or ``by`` or ``columns`` does not consist of names.
+    ValueError
+        A value in ``columns``, other than 0, has an absolute value below 1e-100 or above 1e100.
 
     Examples
     --------
@@ -438,8 +451,9 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
         ``frame``:
 
         - ``task``: name of the task;
-        - ``method``: name of the method, with its setting as in :func:`ranking`;
-        - ``reward``: mean reward, negative ticks (in a world with noise minus the mean of
+        - ``method``: name of the method. It includes the setting if the method occurs in the frame
+          with several settings;
+        - ``reward``: mean reward, negative ticks (in a world with noise, minus the mean of
           ``mean_ticks``);
         - ``n``: number of solved runs;
         - ``gap``: mean gap, a fraction (:func:`relative_gaps`);
@@ -452,8 +466,9 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        A column or a name is missing, a reward is wrong (:func:`relative_gaps`), a task has more
-        than one best known reward, a run has two rows, or runs are in different worlds.
+        A column or a name is missing, a reward is wrong (:func:`relative_gaps`, :func:`shares`), a
+        task has more than one best known reward or, without noise, more than one
+        ``corrective_best``, a run has two rows (:func:`ranking`), or runs are in different worlds.
 
     Examples
     --------
@@ -472,7 +487,10 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def ranking(frame: pd.DataFrame) -> pd.DataFrame:
-    """Rank the methods that solved all tasks of a frame by their mean gap.
+    """Rank methods by their mean gap to the best known rewards of tasks.
+
+    A method is ranked if it has runs on all tasks with a best known reward, and all these runs are
+    solved.
 
     Parameters
     ----------
@@ -480,23 +498,25 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         A row for each run, with columns ``method``, ``task`` (names, numbers or tuples), ``reward``
         and ``best_known`` (negative ticks). Optional columns:
 
-        - ``setting``: setting of the method. A method with several settings has a row of the
-          ranking for each setting, such as ``"cma-es/bandit noise=0.1"``;
+        - ``setting``: setting of the method. If a method has several settings, the ranking has a
+          row for each of them, such as ``"cma-es/bandit sigma=0.1"``;
         - ``ranked_as``: name of the row of the ranking to which the run belongs. It is used instead
           of ``method`` and ``setting``;
+        - ``folder``, ``seed``, ``run_id`` and ``run``: together they identify a run of a method on
+          a task. A frame without these columns has a run in each row;
         - ``corrective_best``: reward of the corrective process alone with its best hands, which
           shares need (:func:`shares`);
         - ``budget``: the number of trials that was asked for, missing for a method without trials;
-        - ``noisy_ticks``: mean ticks of the run's solution with motor noise, missing if executions
-          fail;
+        - ``noisy_ticks``: mean ticks of the run's solution with motor noise, missing if an
+          execution failed;
         - ``note``: what readers should know about the run; empty or missing if there is nothing;
         - ``mean_ticks`` and ``motor_noise``: a run with ``motor_noise`` above 0 has mean ticks
           instead of a reward;
         - ``world``: name of the run's world, empty for the paper's world. All runs must have the
           same world.
 
-        ``load(folder).runs`` contains all of these columns. If the folder contains several worlds,
-        ``load(folder).worlds`` contains a study for each world.
+        ``load(folder).runs`` contains all of these columns except ``folder``. If the folder
+        contains several worlds, ``load(folder).worlds`` contains a study for each world.
 
     Returns
     -------
@@ -510,13 +530,16 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
           the ends of its 95 % interval for other runs on the same tasks; they are NaN with fewer
           than five runs on a task.
         - ``share``, ``share_low``, ``share_high``: mean share of the possible gain
-          (:func:`shares`), over the tasks on which something can be gained. ``without_gain`` is the
-          number of tasks on which nothing can be gained. Only for a frame with ``corrective_best``.
-        - ``noisy_gap``, ``noisy_gap_low``, ``noisy_gap_high``: mean gap of minus ``noisy_ticks`` to
-          the best known reward *without* noise, computed like ``gap``. It is NaN if a run has no
-          ``noisy_ticks``. Only for a frame with ``noisy_ticks``.
-        - ``tasks``: number of tasks on which all runs of the method are solved.
-        - ``runs`` and ``failed``: number of runs, and number of failed runs.
+          (:func:`shares`), over the tasks on which something can be gained. It is NaN for a method
+          that is not ranked. ``without_gain`` is the number of the tasks counted in column
+          ``tasks`` on which no run has a share. Only for a frame with ``corrective_best``.
+        - ``noisy_gap``, ``noisy_gap_low``, ``noisy_gap_high``: mean gap between minus
+          ``noisy_ticks`` and ``best_known``, which is a reward *without* noise, computed like
+          ``gap``. It is NaN for a method that is not ranked, or if a run has no ``noisy_ticks``.
+          Only for a frame with ``noisy_ticks``.
+        - ``tasks``: number of tasks with a best known reward on which the method has runs, all of
+          them solved.
+        - ``runs`` and ``failed``: number of runs, and number of failed runs, on all tasks.
         - ``why``: the reason why the method is not ranked, such as ``"1 of 2 tasks"`` or ``"6 of 9
           runs failed"``; empty for a ranked method.
         - ``note``: the notes on the method's runs, joined by semicolons, each note once. Only for a
@@ -527,9 +550,12 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        A column or a name is missing, a reward is wrong (:func:`relative_gaps`), a task has more
-        than one best known reward, a run has two rows, methods have different budgets, or runs are
-        in different worlds.
+        - A column or a name is missing, or a reward is wrong (:func:`relative_gaps`,
+          :func:`shares`).
+        - A task has more than one best known reward or, without noise, more than one
+          ``corrective_best``.
+        - A run has two rows.
+        - Methods have different budgets, or runs are in different worlds.
 
     Examples
     --------

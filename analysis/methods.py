@@ -1,7 +1,7 @@
 """Describe methods: their names, groups, colours and markers.
 
 The facts about a method, such as its title, are declared in the class of the method.
-:func:`methods_of` returns the frame.
+:func:`methods_of` returns them as a frame, with a row for each setting of each method.
 """
 
 from __future__ import annotations
@@ -22,18 +22,19 @@ if TYPE_CHECKING:
     from coartic.runs.method_info import MethodInfo
 
 CONDITION_OF = {f"{METHOD_PREFIX}{name}": name for name in EVERY_CONDITION}
-"""Maps the id of each form of the learner to its exploration condition, such as ``EC4``. Informed
-conditions and ablations are included."""
+"""Maps the id of each form of the learner to the id of its exploration condition, such as ``EC4``.
+Informed conditions and ablations are included."""
 LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
-"""Ids of the learner under the paper's exploration conditions: EC1 is for tasks with one arm, and
-EC2, EC3 and EC4 are for tasks with two arms."""
+"""Ids of the learner under the paper's exploration conditions: EC1 uses only the right arm, and
+EC2, EC3 and EC4 use both arms."""
 INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
 """Ids of the informed learner, for one arm and for two arms."""
 RANKED_TOGETHER = {EC1: (EC4, EC3), INFORMED_LEARNERS[0]: INFORMED_LEARNERS[1:]}
-"""Maps the id of the learner for one arm to the ids of learners for two arms. The learner for one
-arm shares a row of the ranking with the first of these learners that has runs."""
+"""Maps the id of each learner for one arm to the ids of learners for two arms. The learner for one
+arm shares a row of the ranking with the first of these learners that has runs, but no task in
+common with it (:func:`ranked_as`)."""
 RANDOM_SEARCH = "random-search"
-"""Id of random search, which selects the best of random targets around corrective postures."""
+"""Id of random search. Its solution is the best of many trials with random targets."""
 
 
 COLORS = {
@@ -51,8 +52,8 @@ COLORS = {
 """Maps the name of each colour of methods to its hexadecimal code, from dark to light. ``page.css``
 has lighter colours of the same names for a dark page."""
 OWN_COLOR, OWN_MARK = "walnut", "star"
-"""Colour of the first nine methods from files, and marker of the first one. No built-in method has
-this colour or this marker."""
+"""Colour of the first nine methods from files, and marker of the first one. (Each setting of a
+method counts.) No built-in method has this colour or this marker."""
 ORDER = ("azure", "rust", "navy", "rose", "ink", "grape", "silver", "amber", "forest")
 """Names of the colours of built-in methods. The methods of a group take colours in this order,
 beginning at the first colour of the group (:data:`LOOKS_OF`)."""
@@ -67,8 +68,8 @@ MARKS: dict[str, Any] = {
     "cross": ("X", (0, (7, 1, 3, 1))),
     "thin-diamond": ("d", "-"),
 }
-"""Maps the name of each marker to Matplotlib's code of the marker, and to the line style (dashes)
-of the methods that have this marker."""
+"""Maps the name of each marker to Matplotlib's codes of the marker and of a line style. Methods
+with this marker have lines in this style."""
 
 
 KNOWN_METHODS: Mapping[str, type[Method]] = built_in_methods()
@@ -88,7 +89,7 @@ _WORDS = {
     "spread": "spread ",
     "sequence": "hands ",
 }
-"""Maps names of parameters to the words that stand for them in titles, before the value."""
+"""Maps names of parameters to the words that replace them in titles, in front of the value."""
 
 
 def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False) -> str:
@@ -97,13 +98,13 @@ def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False
     Parameters
     ----------
     method : str or MethodInfo
-        Id or declaration of the method. The name of a method from a file is the title in its
-        declaration, or the id if only the id is passed.
+        Id or declaration of the method. For a method from a file, only the declaration contains the
+        title; if the id is passed, the name is the id.
     setting : str
         Setting of the method, such as ``sigma=0.1, stop=1``; empty for the default setting.
     short : bool
-        True for the short name that the method declares. If it declares none, the short name of a
-        built-in method is its title, and that of a method from a file is its id.
+        True for the short name that the method declares. A method without a declared short name has
+        its title as its short name if it is built in, and its id if it is from a file.
 
     Returns
     -------
@@ -128,10 +129,10 @@ def subject_of(method: Mapping[str, Any]) -> str:
     """Return the name of a method as the subject of a sentence.
 
     - The title of a method from a file is put in quotation marks, because users choose it freely.
-    - The title of a built-in method gets the article *the*, except CMA-ES and names of activities,
-      such as random search.
-    - A title that contains a comma, such as ``CMA-ES, hands goal by goal``, gets a comma at its
-      end.
+    - The title of a built-in method gets the article *the*, unless its algorithm is CMA-ES or an
+      activity, such as random search.
+    - If the title of a built-in method has a comma before the setting, as in ``CMA-ES, hands goal
+      by goal``, another comma is added at the end.
 
     Parameters
     ----------
@@ -148,24 +149,25 @@ def subject_of(method: Mapping[str, Any]) -> str:
 
 
 def describe_setting(setting: str) -> str:
-    """Return a setting in the words of titles: ``σ 0.1, stop 1`` for ``sigma=0.1, stop=1``."""
+    """Return a setting as titles show it: ``σ 0.1, stop 1`` for ``sigma=0.1, stop=1``."""
     pairs = (part.partition("=") for part in one_line(setting).split(", "))
     words = (_WORDS.get(key, key + equals) + value for key, equals, value in pairs)
     return ", ".join(words).replace("_", " ")
 
 
 def describe_values(values: Mapping[str, Any]) -> str:
-    """Return the values of parameters in words, such as ``noise_sd 0.05, epsilon 0.2``.
+    """Return the values of parameters as a string, such as ``noise_sd 0.05, epsilon 0.2``.
 
-    ``values`` maps the name of each parameter, as a suite's file writes it, to its value.
+    ``values`` maps the name of each parameter to its value.
     """
     return ", ".join(f"{name} {one_line(str(value))}" for name, value in values.items())
 
 
 def default_name(method: str) -> str:
-    """Return what a method's default values are called: ``the paper's`` or ``default``.
+    """Return the word for the default parameters of a method: ``the paper's`` or ``default``.
 
-    They are ``the paper's`` for the learner under the paper's conditions. ``method`` is an id.
+    The word is ``the paper's`` for the learner under the paper's conditions (:data:`LEARNERS`).
+    ``method`` is the id of the method.
     """
     return "the paper's" if method in LEARNERS else "default"
 
@@ -175,22 +177,22 @@ BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "using the reward as a formula",
     "not using the reward",
 )
-"""Names of the three groups of methods, which differ in how they use the reward."""
+"""Names of the three groups of methods, which use the reward in different ways."""
 LOOKS_OF = {
     BY_TRIAL: ("azure", ("diamond", "circle", "triangle")),
     BY_FORMULA: ("amber", ("square", "inverted-triangle", "plus")),
     WITHOUT_REWARD: ("azure", ("cross", "thin-diamond")),
 }
-"""Maps each group to the first colour and to all markers of its built-in methods. The groups that
-use the reward begin at different colours, so that the shortest-path plan looks different from the
-learners and searches with which figures compare it."""
+"""Maps each group to the first colour and to all markers of its built-in methods
+(:func:`_pairs_of`). The two groups that use the reward begin at different colours, so that the
+shortest-path plan looks different from the learners and searches with which figures compare it."""
 KINDS = {
     BY_TRIAL: ("navy", "circle", "blue"),
     BY_FORMULA: ("rust", "square", "orange"),
     WITHOUT_REWARD: ("forest", "diamond", "green"),
 }
-"""Maps each group to the colour, the marker and the word for the colour of its built-in methods, in
-figures that have a row for each method."""
+"""Maps each group to the colour and the marker of its built-in methods in figures with a row for
+each method, and to the word for this colour in captions."""
 MARK = " ‡"
 """Mark after the title of a method for which there are warnings (:attr:`.Study.marks`)."""
 
@@ -200,15 +202,17 @@ def methods_of(
 ) -> pd.DataFrame:
     """Return a frame with a row for each setting of each method with runs.
 
-    Built-in methods come first, in the order of :data:`.MODULES`. Methods from files follow, in the
-    order of the suite. If two conditions of the learner share a row of the ranking
-    (:func:`ranked_as`), the frame contains a further row for both together, which copies most
-    columns of the second condition.
+    Built-in methods come first, in the order of :data:`KNOWN_METHODS`. Methods from files follow,
+    in the order of the suite. If two conditions of the learner share a row of the ranking
+    (:func:`ranked_as`), the frame contains a further row for both together. Except for the titles,
+    the columns of this row are those of the second condition.
 
     Parameters
     ----------
     runs : DataFrame
-        A row for each run, with the columns of :attr:`.Study.runs`, in the order of the suite.
+        A row for each run, in the order of the suite. The columns must include ``label``,
+        ``ranked_as``, ``method``, ``setting``, ``task``, ``parameters``, ``information`` and
+        ``trials`` (:attr:`.Study.runs`).
     declared : mapping of str to MethodInfo
         Maps the id of each method, without a setting, to its declaration.
     marked : collection of str, optional
@@ -272,11 +276,11 @@ def methods_of(
 def parameters_varied(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.DataFrame:
     """Return the values of the parameters that a study varies, for each setting.
 
-    A study varies parameters if, apart from searches for the optimum,
+    Runs of searches for the optimum are ignored. A study varies parameters if
 
-    - all runs are of one method;
+    - all other runs are of one method;
     - the method has at least two settings;
-    - each setting was run on all tasks.
+    - each setting was run on all tasks of these runs.
 
     Parameters
     ----------
@@ -289,9 +293,10 @@ def parameters_varied(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) ->
     Returns
     -------
     DataFrame
-        A row for each label, and a column for each parameter that has at least two values. The
-        parameter with the most values comes first. The rows are sorted by the columns that have
-        only numbers, in ascending order. The frame is empty if the study does not vary parameters.
+        A row for each setting, indexed by its label, and a column for each parameter that has at
+        least two values. The parameter with the most values comes first. The rows are sorted by the
+        columns that contain only numbers, in ascending order. The frame is empty if the study does
+        not vary parameters.
     """
     import pandas as pd
 
@@ -321,12 +326,14 @@ def are_numbers(values: Iterable[object]) -> bool:
 
 
 def _group_of(runs: pd.DataFrame) -> str:
-    """Return the group of a method (one of :data:`GROUPS`), which its declaration and runs decide.
+    """Return the group of a method (one of :data:`GROUPS`) from all its runs.
 
-    - ``using the reward of each trial``, if the method declares that it uses this information, and
-      a run made more than one trial;
-    - otherwise ``using the reward as a formula``, if the method declares that it uses this
-      information;
+    The group is
+
+    - ``using the reward of each trial``, if the method declares that it uses the reward of each
+      trial, and at least one run made more than one trial;
+    - otherwise ``using the reward as a formula``, if the method declares that it uses the formula
+      of the reward;
     - otherwise ``not using the reward``.
     """
     information = {kind for text in runs.information.unique() for kind in text.split(", ")}
@@ -349,10 +356,10 @@ def ranked_as(runs: pd.DataFrame) -> pd.Series:
     """Return the name of the row of the ranking to which each run belongs.
 
     The name is the label of the run (column ``label``), with one exception. The learner needs one
-    condition for tasks with one arm and another condition for tasks with two arms. If both
-    conditions have runs, but no task in common, the two conditions share a row
-    (:data:`RANKED_TOGETHER`), and all runs of both get the name of this row (:func:`joined_label`).
-    The result has the index of ``runs``.
+    condition for tasks with one arm and another condition for tasks with two arms
+    (:data:`RANKED_TOGETHER`). If both conditions have runs with default parameters, but no task in
+    common, the two conditions share a row, and these runs get the name of this row
+    (:func:`joined_label`). The result has the index of ``runs``.
     """
     tasks = {label: {*of_method.task} for label, of_method in runs.groupby("label")}
     names = runs.label
@@ -373,9 +380,9 @@ def joined_label(one: str, two: str) -> str:
 
 
 def _pairs_of(group: str) -> list[tuple[str, str]]:
-    """Return all pairs of a colour and one of the markers of a group.
+    """Return all pairs of a colour of :data:`ORDER` and a marker of a group.
 
-    Each pair differs from the previous pair in its colour and in its marker.
+    Each pair differs from the previous pair both in colour and in marker.
     """
     first, marks = LOOKS_OF[group]
     begin = ORDER.index(first)
@@ -389,9 +396,11 @@ def _pairs_of(group: str) -> list[tuple[str, str]]:
 def _looks_of_built_in() -> dict[str, tuple[str, str]]:
     """Return a dict that maps ids of built-in methods to colours and markers.
 
-    It contains only the methods that represent their algorithms. The methods of each group
-    (:data:`GROUPS`) take the pairs of :func:`_pairs_of`, in the order of the methods. The learner
-    for one arm gets the colour of the first learner for two arms in :data:`RANKED_TOGETHER`.
+    The dict contains only the methods that represent their algorithms (``headline`` of
+    :class:`.Facts`). Each method takes the first free pair of its group (:func:`_pairs_of`). The
+    methods choose in the order of :data:`KNOWN_METHODS`, but learners for one arm choose last: each
+    takes the first free pair with the colour of the first learner for two arms in
+    :data:`RANKED_TOGETHER`.
     """
     looks, free = dict[str, tuple[str, str]](), {group: _pairs_of(group) for group in GROUPS}
     headlines = {name: each for name, each in KNOWN_METHODS.items() if each.facts.headline}
@@ -409,14 +418,16 @@ its marker."""
 
 
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield, for each row, its label and the names of its colour and marker.
+    """Yield the label of each row, with the names of its colour and marker.
+
+    ``rows`` maps labels to dicts of the columns of :attr:`.Study.methods`. Rows of methods from
+    files come first.
 
     - A row that has a ``style`` already keeps it.
-    - The first nine methods from files get the colour :data:`OWN_COLOR`, each with another marker.
+    - The first nine rows of methods from files get the colour :data:`OWN_COLOR`, each with another
+      marker.
     - Each other row gets the next free pair of its group. Pairs with a colour that does not occur
       in any ``style`` come first. After the last free pair, the first one is used again.
-
-    ``rows`` maps labels to the columns of :attr:`.Study.methods`.
     """
     fixed = {row["style"] for row in rows.values()}
     taken = {look[0] for look in fixed if look}
@@ -437,11 +448,11 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
-    """Leave out the rows that are settings or ablations of another method in ``rows``.
+    """Leave out the rows that are settings or ablations of a method in another row.
 
-    ``rows`` are rows of :attr:`.Study.methods`. Column ``parent`` names the method of which a row
-    is a setting or an ablation. In a study that varies parameters, the settings have no parent, and
-    are kept.
+    ``rows`` are rows of :attr:`.Study.methods`. A row is left out if the label in its column
+    ``parent`` is in the index of ``rows``. In a study that varies parameters, the settings have no
+    parent, and are kept.
     """
     return rows[~rows.parent.isin(rows.index)]
 
@@ -449,9 +460,9 @@ def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
 def headline_methods(rows: pd.DataFrame) -> list[str]:
     """Return the labels of the methods that represent their algorithms.
 
-    If no method in ``rows`` represents its algorithm, all labels are returned. ``rows`` are rows of
-    :attr:`.Study.methods`; column ``headline`` says which methods represent their algorithms.
-    Settings and ablations are left out as in :func:`without_settings`.
+    ``rows`` are rows of :attr:`.Study.methods`. The result contains the rows of
+    :func:`without_settings` in which column ``headline`` is True. If there are none, all labels of
+    ``rows`` are returned.
     """
     headlines = without_settings(rows)
     headlines = headlines[headlines.headline]

@@ -29,28 +29,30 @@ class BestKnown(KnownOptimum):
     """Where the reward comes from:
 
     - ``shipped``;
-    - the label of a method, if its best run has a higher reward than the shipped one;
-    - ``corrective process alone``, if the reward of this process is higher than both.
+    - the label of a method, if its best run has a higher reward than the shipped reward, or if no
+      reward is shipped;
+    - ``corrective process alone``, if the reward of this process is higher than all others.
     """
     run_id: str = ""
     """Id of the best run; empty if the source is not a run."""
     only_here: bool = False
-    """True if only methods of this folder know a reward: no reward is shipped for the task, and no
-    search for the optimum of this folder solved it with the task's own base."""
+    """True if the reward is known only from methods that are not searches for the optimum. Then no
+    reward is shipped for the task, and no search of this folder solved the task without additional
+    locks of the base."""
 
 
 CANDIDATES = 5
-"""Number of runs on a task that are executed again in a world with noise, to find the best of them:
-those with the best stored values."""
+"""Number of runs on each task that are executed again in a world with noise, to find the best of
+them. These are the runs with the best stored values."""
 FRESH_EXECUTIONS = 1_000
-"""Number of executions with motor noise whose mean ticks are a reference in a world with noise."""
+"""Number of executions with motor noise from which a best known reward is computed."""
 
 
 def run_values(runs: pd.DataFrame) -> pd.Series:
-    """Return the value of each run, the number that all rankings compare.
+    """Return the value of each run, from which gaps and rankings are computed.
 
     The value of a run is its reward. In a world with noise, where the reward is missing, the value
-    is minus the run's ``mean_ticks``. It is NaN for a failed run.
+    is minus the run's ``mean_ticks``. It is NaN if both are missing, as for a failed run.
 
     Parameters
     ----------
@@ -79,18 +81,17 @@ def best_known(
     """Return the best known reward of each task in one world.
 
     The best known reward is the highest among the shipped reward and the rewards of all solved
-    runs, including those of searches for the optimum and runs that were included from other
-    folders. Runs of searches that lock other base coordinates than the task does are left out,
-    because they solve another task. A task is left out if
+    runs, including the runs of searches for the optimum. Runs of searches with additional locks of
+    the base are left out, because they solve another task. A task is left out if
 
     - its best reward is 0, because the gap is divided by this reward;
     - no reward is known;
-    - no reward is shipped, and all runs are of one method with one setting, which is not a search
-      for the optimum. These runs would be compared with themselves.
+    - no reward is shipped, and all solved runs are of one method with one setting, which is not a
+      search for the optimum. These runs would be compared with themselves.
 
-    In a world with noise, the best of many stored values would be best partly by luck. Therefore
-    the five runs with the best values are executed again with other noise, and the highest of the
-    new means is used instead.
+    In a world with noise, the highest of many stored values is partly luck. Therefore the five runs
+    on each task with the highest values are executed again with other noise. The highest of these
+    five new means is compared with the shipped reward.
 
     Parameters
     ----------
@@ -103,13 +104,14 @@ def best_known(
         Maps the name of each task to the motion model of the world. A task without an entry has the
         paper's model.
     fresh : callable, only in a world with noise
-        Function of the name of a task and of the ids of runs on this task. It executes each run
-        :data:`FRESH_EXECUTIONS` times and returns minus the mean ticks of each run.
+        Function of two arguments: the name of a task, and a list of ids of runs on this task. It
+        executes each run :data:`FRESH_EXECUTIONS` times, and returns a list with minus the mean
+        ticks of each run.
 
     Returns
     -------
     dict of str to BestKnown
-        Maps the name of each task to its best known reward.
+        Maps the name of each task that is not left out to its best known reward.
     """
     values = run_values(runs)
     solved = runs.assign(value=values)[
@@ -144,7 +146,7 @@ def best_known(
 
 
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return how the search for the optimum in each run restricted the base and the other arm.
+    """Return how each run of a search for the optimum restricted the base and the idle arm.
 
     Parameters
     ----------
@@ -154,9 +156,9 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        The values of the parameters ``base`` and ``other_arm`` of each run, with the index of
-        ``runs``. For a method that is not a search for the optimum, the two values are ``task`` and
-        ``free``, even if the method has parameters with these names.
+        Columns ``base`` and ``other_arm``, the values of these parameters in each run, with the
+        index of ``runs``. For a method that is not a search for the optimum, the two values are
+        ``task`` and ``free`` (no restriction), even if the method has parameters with these names.
     """
     default = {"base": BASE, "other_arm": "free"}
     pairs = [*zip(runs.method, runs.parameters, strict=True)]
@@ -172,7 +174,6 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
 def relative_gap(rewards: ArrayLike, optimum: ArrayLike) -> Array:
     """Return (optimum − reward) / |optimum|, a fraction: 0.01 is 1 % more ticks.
 
-    ``rewards`` and ``optimum`` are in negative ticks. The result has the shape to which both
-    broadcast.
+    ``rewards`` and ``optimum`` are in negative ticks, and are broadcast against each other.
     """
     return np.asarray(np.subtract(optimum, rewards, dtype=np.float64) / np.abs(optimum))

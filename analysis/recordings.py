@@ -1,9 +1,9 @@
 """Read recorded trials of people, and check whether they fit the task.
 
 A recording is a table with a row for each hit of a goal. For a table with a missing column or a
-wrong value, the functions raise CoarticError, whose message shows the first wrong row. For any
-other table, :func:`consistency` returns two numbers for each hit: how far the hand is from the
-goal, and how fast the movement is.
+wrong value, the functions raise CoarticError. The message names the column and, for a wrong value,
+the first row that has one. :func:`consistency` returns two numbers for each hit: how far the hand
+is from the goal, and how slow the movement is compared with the model's.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from coartic.model import PAPER
 from coartic.robot import MAX_ENTRY, Array
 
 FAR = 2.0
-"""Largest distance of the hand from the centre of the goal, in radii of the goal, at which a
+"""Largest distance between the hand and the centre of the goal, in radii of the goal, at which a
 recorded hit fits the task."""
 _KEY = ["subject", "trial", "goal"]
 _OF_CALLER = 6  # level in the stack of the caller of a function with checked arguments
@@ -36,8 +36,9 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
     Parameters
     ----------
     path : str or pathlib.Path
-        A CSV file in UTF-8 with the columns of :func:`check_hits`. Lines that begin with ``#``,
-        empty lines and other columns are ignored. A column ``duration`` can replace ``ticks``.
+        A CSV file in UTF-8 with the columns of :func:`check_hits`. A column ``duration`` can
+        replace ``ticks``. Other columns, empty lines, and the text from a ``#`` to the end of its
+        line are ignored.
     task : Task
         The task that was practised.
     ticks_per_unit : float
@@ -52,9 +53,9 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
     Raises
     ------
     CoarticError
-        - The file cannot be read.
-        - The file has a column ``ticks``, and also a column ``duration`` or a ``ticks_per_unit``
-          other than 1.
+        - The file cannot be read, or is not a table.
+        - The file has a column ``ticks``, and also a column ``duration``; or it has a column
+          ``ticks``, and ``ticks_per_unit`` is not 1.
         - :func:`check_hits` refuses the rows.
     ValueError
         ``ticks_per_unit`` is not from 1e-9 to 1e9.
@@ -69,10 +70,11 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
 
 @checked_arguments
 def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
-    """Return recorded hits, checked and sorted by subject, trial and goal.
+    """Check recorded hits, and return them sorted by subject, trial and goal.
 
     The joint angles of each trial are unwrapped: a multiple of 2π is added to each angle, so that
-    it differs by at most π from the angle at the previous hit, or at the start of the task.
+    it differs by at most π from the same angle at the previous recorded hit of the trial. The
+    angles at the first hit are compared with those at the start of the task.
 
     Parameters
     ----------
@@ -82,15 +84,15 @@ def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
         - ``subject``: name of the person;
         - ``trial``: number of the person's trial, from 1;
         - ``goal``: number of the goal that is hit, from 1;
-        - ``hand``: the hand that hits the goal, ``left`` or ``right``;
-        - ``ticks``: the time since the previous hit of the trial, or since its start;
+        - ``hand``: the hand that hits the goal, ``left`` or ``right``, among ``task.hands``;
+        - ``ticks``: the time from the previous hit of the trial, or from the start of the trial;
         - the posture at the hit: a column for each name in ``task.robot.joint_names``, with the
           position of the base in length units and the joint angles in rad.
 
         Rows of some hits may be missing. A column of the base may be missing if the task locks the
-        base in this coordinate, and the columns of an arm may be missing if its hand is not among
-        ``task.hands``. A missing column is filled with the value of its coordinate at the start of
-        the task.
+        base in this coordinate. It is then filled with the coordinate at the start of the task. The
+        columns of an arm whose hand is not among ``task.hands`` are not read: they are always
+        filled with the angles at the start of the task.
     task : Task
         The task that was practised.
 
@@ -103,7 +105,8 @@ def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        - A column is missing, or a value does not fit its column.
+        - The frame has no rows, a column is missing or occurs twice, or a value does not fit its
+          column. All numbers must be from -1e5 to 1e5.
         - Two rows have the same subject, trial and goal.
         - More than half of the hits of a subject are more than two radii from the centres of their
           goals.
@@ -112,8 +115,7 @@ def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
     -----
     UserWarning
         - At least one hit of a subject is more than two radii from the centre of its goal.
-        - The median movement of a subject takes less than a tenth, or more than ten times, of the
-          time of a straight movement of the model.
+        - The median ``pace`` of a subject (:func:`consistency`) is below 0.1, above 10, or NaN.
     """
     return _judged(_readable(frame, task, "the frame"), task, "the frame")
 
@@ -136,15 +138,18 @@ def consistency(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
 
         - ``x``, ``y``: the position of the hand in length units, computed from the posture by
           forward kinematics;
-        - ``off``: the distance of the hand from the centre of the goal, in radii of the goal;
+        - ``off``: the distance between the hand and the centre of the goal, in radii of the goal;
         - ``pace``: the recorded ticks of the movement, divided by the ticks of a straight movement
-          of the model between the same two postures (the previous hit, or the start of the task,
-          and this hit). It is NaN if the row of the previous hit is missing.
+          of the model (not rounded, at least 1). Both movements go from the posture at the previous
+          hit, or at the start of the task, to the posture at this hit. ``pace`` is NaN if the row
+          of the previous hit is missing.
 
     Raises
     ------
     CoarticError
-        The hits cannot be read (:func:`check_hits`).
+        The frame has no rows, a column is missing or occurs twice, a value does not fit its column,
+        or two rows have the same subject, trial and goal. Unlike in :func:`check_hits`, hits far
+        from their goals are allowed.
 
     Examples
     --------
@@ -161,10 +166,10 @@ def consistency(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
 
 @checked_arguments
 def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
-    """Return recorded trials as solutions, so that their signatures can be computed.
+    """Return recorded trials as solutions, whose signatures can be computed.
 
-    No movement is simulated: the postures are those of the recording, and the ticks are rounded to
-    integers.
+    No movement is simulated: postures and ticks are those that :func:`check_hits` returns, with the
+    ticks rounded to integers.
 
     Parameters
     ----------
@@ -177,8 +182,8 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
     -------
     Solutions
         A run for each trial in which all goals are hit. The id of a run is the name of the subject
-        and the number of the trial, such as ``P1 3``. ``unfinished`` is the number of the other
-        trials.
+        and the number of the trial, such as ``P1 3``. ``unfinished`` is the number of trials in
+        which only some goals are hit.
 
     Raises
     ------
@@ -219,8 +224,8 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
 def _hits_in_file(path: str | Path, task: Task, ticks_per_unit: float) -> pd.DataFrame:
     """Return the hits of a CSV file as :func:`_readable` does.
 
-    Column ``duration``, if there is one, is converted to ``ticks``. Raises the errors of
-    :func:`read_hits`.
+    A column ``duration`` is converted to ``ticks``. Raises the errors of :func:`read_hits`, except
+    those of :func:`_judged`.
     """
     check_limits("ticks_per_unit", ticks_per_unit, 1e-9, 1e9)
     frame, source = _table(path), str(path)
@@ -236,7 +241,7 @@ def _hits_in_file(path: str | Path, task: Task, ticks_per_unit: float) -> pd.Dat
 
 
 def _table(path: str | Path) -> pd.DataFrame:
-    """Return a CSV file as a frame, indexed by data rows from 1.
+    """Return a CSV file as a frame, indexed by the numbers of its data rows, from 1.
 
     Raises CoarticError if the file cannot be read, or is not a table.
     """
@@ -277,8 +282,8 @@ def _require(frame: pd.DataFrame, columns: list[str], source: str) -> None:
 def _numbers(frame: pd.DataFrame, columns: list[str], source: str) -> Array:
     """Return columns of a frame as an array of float64, shape ``(rows, columns)``.
 
-    Text that spells a number is converted. Raises CoarticError for a value that is not, or does not
-    spell, a real number from -1e5 to 1e5. ``source`` is the name of the frame in the message.
+    Strings are converted to numbers. Raises CoarticError for a value that is not a real number from
+    -1e5 to 1e5, or a string of one. ``source`` is the name of the frame in the message.
     """
     numbers = np.empty((len(frame), len(columns)))
     for k, name in enumerate(columns):
@@ -322,10 +327,10 @@ def _refuse(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str, sou
 
 
 def _readable(frame: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
-    """Return recorded hits as :func:`check_hits` does, without a check of postures and times.
+    """Return recorded hits as :func:`check_hits` does, but without the check of :func:`_judged`.
 
-    Raises CoarticError if a column is missing, a value does not fit its column, or a hit occurs
-    twice. ``source`` is the name of the frame in the message.
+    Raises CoarticError if there are no rows, a column is missing or occurs twice, a value does not
+    fit its column, or a hit occurs twice. ``source`` is the name of the frame in the message.
     """
     joints = [*task.robot.joint_names]
     is_used = np.zeros(len(joints), dtype=bool)
@@ -382,9 +387,10 @@ def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
     """Check whether hits that :func:`_readable` returned fit the task, and return them unchanged.
 
     - Warns if a hit of a subject is more than two radii from the centre of its goal. Raises
-      CoarticError if more than half of the hits of a subject are that far from the centres.
-    - Warns if the median movement of a subject takes less than a tenth or more than ten times the
-      model's time.
+      CoarticError if this is so for more than half of the hits of a subject.
+    - Warns if the median ``pace`` of a subject is below 0.1, above 10, or NaN.
+
+    ``source`` is the name of the hits in these messages.
     """
     for subject, fit in _fit(hits, task).groupby("subject", sort=False):
         far, pace = fit.off > FAR, fit.pace.median()

@@ -1,9 +1,10 @@
 """Compute running times: the costs, such as trials, at which runs reach reward targets.
 
 Running times and their ECDF are defined as in COCO (Hansen et al. 2021). The empirical cumulative
-distribution function (ECDF) of running times maps a budget to the fraction of all pairs of a run
-and a target in which the run reached the target within the budget. :func:`runtimes` returns the
-ECDF for a results folder, and :func:`ecdf` for a frame of your own.
+distribution function (ECDF) of running times maps a budget to the fraction of pairs of a run and a
+target in which the run reached the target within the budget. Here the fraction is computed on each
+task, and then averaged over tasks. :func:`runtimes` returns the ECDF for a results folder, and
+:func:`ecdf` for a frame of your own.
 """
 
 from __future__ import annotations
@@ -38,26 +39,27 @@ corrective process alone with its best hands, and 1 is the best known reward."""
 _MAX_DRAWN_RUNS = 20_000_000  # in all resamples together; very many runs have fewer resamples
 RunningTimes = Sequence[Array]
 """A list with an array for each task, shape ``(runs, targets)``: the cost at which each run of a
-method reaches each target. The cost is infinite if the run does not reach the target."""
+method reaches each target. The cost is infinite if the run does not reach the target. All arrays
+have the same number of targets."""
 
 
 def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Return the reached pairs of run and target, in ascending order of running time.
+    """Return the pairs of a run and a reached target, ordered by running time.
 
     Parameters
     ----------
     times : sequence of arrays, shape (runs, targets)
-        Running times on each task. Each task must have a run.
+        Running times on each task. Each task must have at least one run.
 
     Returns
     -------
     ndarray, shape (k,)
-        Running times of the k pairs that are reached, in ascending order.
+        Running times of the k pairs whose target is reached, in ascending order.
     ndarray, shape (k,)
-        Weight of each of these pairs. All tasks have the same weight, and within a task all pairs
+        Weight of each of the k pairs. All tasks have the same weight, and within a task all pairs
         have the same weight. The weights of all pairs, reached or not, sum to 1.
     ndarray of int, shape (k,)
-        Number of the run of each of these pairs. Runs are numbered from 0, continuously over all
+        Number of the run of each of the k pairs. Runs are numbered from 0, continuously over all
         tasks.
     """
     values = np.concatenate([of_task.ravel() for of_task in times])
@@ -69,7 +71,7 @@ def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
 
 
 def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
-    """Return the ECDF of running times: the budgets at its steps, and its values there.
+    """Return the budgets and the values at the steps of the ECDF of running times.
 
     Parameters
     ----------
@@ -81,9 +83,9 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
     ndarray, shape (k,)
         Budgets at which the ECDF rises, in ascending order, in the unit of ``times``.
     ndarray, shape (k,)
-        Values of the ECDF from each of these budgets on: on each task, the fraction of pairs of a
-        run and a target in which the run reached the target; averaged over tasks. If no target is
-        reached, there is one infinite budget with the value 0.
+        Value of the ECDF at each of these budgets: the fraction of pairs of a run and a target in
+        which the run reached the target within the budget, computed on each task and averaged over
+        tasks. If no target is reached, there is one infinite budget with the value 0.
     """
     values, weights, _ = _pairs(times)
     if not len(values):
@@ -95,7 +97,7 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
 def share_reached(times: RunningTimes) -> float:
     """Return the fraction of targets that the runs of a method reach at any cost, from 0 to 1.
 
-    On each task, it is the fraction of pairs of a run and a target in which the run reached the
+    On each task, this is the fraction of pairs of a run and a target in which the run reached the
     target. The result is the mean of these fractions over tasks. ``times`` contains an array of
     running times for each task, shape ``(runs, targets)``.
     """
@@ -117,8 +119,9 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     Estimate
         The budget, in the unit of ``times``, with its 95 % interval. The budget is infinite if the
         ECDF does not reach ``share`` at any cost. The interval is the percentile interval of a
-        bootstrap that resamples runs within tasks. It is not widened for small numbers of runs,
-        because budgets can be infinite. There is no interval if a task has fewer than five runs.
+        bootstrap that resamples runs within tasks. The interval is not widened for small numbers of
+        runs, because budgets can be infinite. There is no interval if a task has fewer than five
+        runs.
     """
     values, weights, runs = _pairs(times)
 
@@ -172,7 +175,7 @@ def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     """Return how often each bootstrap sample draws each run, shape ``(resamples, runs)``.
 
     ``sizes`` contains the number of runs on each task. There are 1,999 bootstrap samples, or fewer
-    (at least 200) for a very large number of runs. The array is cached: do not change it.
+    (at least 200) for more than about 10,000 runs. The array is cached: do not change it.
     """
     rng = np.random.default_rng(SEED)
     resamples = min(FEWER_RESAMPLES, max(_MAX_DRAWN_RUNS // sum(sizes), 200))
@@ -186,15 +189,15 @@ def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
 
 @lru_cache(maxsize=4)
 def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
-    """Return the learning curve of each run: the trials that improved its best reward.
+    """Return the learning curve of each run: the trials with a new best reward.
 
     Returns
     -------
     dict of str to (ndarray, ndarray)
-        Maps the id of each run to two arrays, shape ``(n,)`` each: the numbers of the trials, from
-        1, whose reward was higher than those of all earlier trials, and these rewards (negative
-        ticks). Runs whose rewards of trials are not stored are left out. The dict is cached: do not
-        change it.
+        Maps the id of each run to two arrays, shape ``(n,)`` each, for the n trials whose reward
+        was higher than that of each earlier trial: the numbers of these trials, counted from 1, and
+        their rewards (negative ticks). Runs without stored rewards of trials are left out. The dict
+        is cached: do not change it.
     """
     by_run = {}
     for run_id, rewards in study.rewards():
@@ -212,7 +215,7 @@ def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
     steps : (ndarray, ndarray)
         Learning curve of the run: its entry in the dict of :func:`improvements`.
     trials : array_like of int
-        Numbers of trials, of any shape.
+        Numbers of trials, an array of any shape.
 
     Returns
     -------
@@ -225,11 +228,12 @@ def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
 
 @lru_cache(maxsize=4)
 def target_ranges(study: Study) -> dict[str, tuple[float, float]]:
-    """Return a dict that maps each task's name to the range of its targets.
+    """Return a dict that maps the name of each task to the range of its reward targets.
 
-    The range goes from :attr:`.Study.corrective_best` to the best known reward, both in negative
-    ticks. A task is left out if one of the two rewards is missing, or if both are equal. The dict
-    is empty in a world with noise, where the reward of a single trial is partly luck.
+    The range is a pair: the reward of the corrective process alone (:attr:`.Study.corrective_best`)
+    and the best known reward, both in negative ticks. A task is left out if one of the two rewards
+    is missing, or if both are equal. The dict is empty in a world with noise, where the reward of a
+    single trial is partly luck. It is cached: do not change it.
     """
     if study.is_noisy:
         return {}
@@ -242,7 +246,7 @@ def target_ranges(study: Study) -> dict[str, tuple[float, float]]:
 def times_of(
     study: Study, task: str, label: str, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> Array:
-    """Return the running times of a method on a task.
+    """Return the running times of the runs of a method on a task.
 
     Parameters
     ----------
@@ -255,20 +259,23 @@ def times_of(
         The cost: number of trials, number of forward-kinematics evaluations, or wall time in s.
     shares : tuple of float
         Targets, as fractions of the distance from the reward of the corrective process alone (0) to
-        the best known reward (1). A target is rounded up to integer ticks.
+        the best known reward (1). Each target reward is rounded up to an integer.
 
     Returns
     -------
     ndarray, shape (runs, targets)
         Running times, in the unit of the cost. They are infinite for a target that no trial of the
-        run reached, and for a failed run. A solved run whose cost is unknown has no row.
+        run reached, and for a failed run. A solved run whose cost is unknown has no row. The array
+        is cached: do not change it.
 
     Notes
     -----
-    - A run whose rewards of trials are not stored reaches the targets of its solution at its end.
-    - Forward-kinematics evaluations and time (:func:`solve_times`) are only known for a whole run.
-      They are spread evenly over its trials. In truth, early trials took 0.6 to 3.4 times as many
-      evaluations as the average trial.
+    - A run without stored rewards of trials reaches all targets up to the reward of its solution at
+      its end. If the cost is the number of trials, this running time is 0 for a method that makes
+      no trials.
+    - Forward-kinematics evaluations and wall time (:func:`solve_times`) are only known for a whole
+      run. They are spread evenly over its trials, which is not exact: the first trials can take
+      several times as many evaluations as the average trial.
     """
     initial, optimum = target_ranges(study)[task]
     targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)
@@ -291,10 +298,10 @@ def times_of(
 
 
 def solve_times(runs: pd.DataFrame) -> pd.Series:
-    """Return the wall time of solving of each run in a warm process.
+    """Return the wall times of the runs that were made in a warm process.
 
-    A process is warm if it has performed the method before, so that its time does not include
-    compiling. If no run was made in a warm process, the times of all runs are returned.
+    A process is warm if it has run the method before, so that the wall time does not include
+    compilation. If no run was made in a warm process, the times of all runs are returned.
 
     Parameters
     ----------
@@ -304,8 +311,8 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
     Returns
     -------
     Series
-        Times in s, with the index of the selected runs: ``solve_s``, or ``wall_s`` for a run whose
-        ``solve_s`` is 0 or missing.
+        Times in s, with the index of the selected runs: ``solve_s`` (the time of solving), or
+        ``wall_s`` for a run whose ``solve_s`` is 0 or missing.
     """
     times = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
     warm = runs.warm.to_numpy(bool, na_value=False)
@@ -314,10 +321,11 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 @lru_cache(maxsize=4)
 def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
-    """Return a dict that maps each method's label to its runs on tasks with targets.
+    """Return a dict that maps each row of the ranking to its runs on tasks with targets.
 
-    The tasks are those of :func:`.ranked_tasks` that have targets (:func:`target_ranges`). Methods
-    that did not run on all of these tasks are left out. The dict is cached: do not change it.
+    The keys are those of :func:`.runs_by_method`. The tasks are those of :func:`.ranked_tasks` that
+    have targets (:func:`target_ranges`). Rows of the ranking without a run on one of these tasks
+    are left out. The dict is cached: do not change it.
     """
     tasks = [task for task in ranked_tasks(study) if task in target_ranges(study)]
     of_methods = {}
@@ -333,8 +341,8 @@ def times_on_tasks(
 ) -> list[Array]:
     """Return the running times of a method on each of its tasks (:func:`times_of`).
 
-    ``runs`` are the method's runs. The list has an array, shape ``(runs, targets)``, for each pair
-    of task and label in ``runs``, in the order of the rows.
+    ``runs`` are the runs of a row of the ranking. The list contains an array, shape ``(runs,
+    targets)``, for each pair of a task and a label in ``runs``, in the order of the rows.
     """
     return [times_of(study, *cell, spend, shares) for cell in cells_of(runs)]
 
@@ -344,8 +352,9 @@ def runtimes(
 ) -> pd.DataFrame:
     """Return the share of targets that each method reaches within a budget: its ECDF.
 
-    Only methods that ran on all ranked tasks with targets are included. A failed run reaches no
-    target. All tasks have the same weight.
+    The tasks are those whose best known reward is above the reward of the corrective process alone.
+    Methods without a run on one of these tasks, and searches for the optimum, are left out. A
+    failed run reaches no target. All tasks have the same weight.
 
     Parameters
     ----------
@@ -354,28 +363,29 @@ def runtimes(
     targets : sequence of float, shape (n,), optional
         Reward targets, as fractions of the distance from the reward of the corrective process alone
         with its best hands (0) to the best known reward (1). They are above 0 and up to 1; by
-        default 0.05, 0.1, ..., 1. Each target reward is rounded up to integer ticks.
+        default 0.05, 0.1, ..., 1. Each target reward is rounded up to an integer.
 
     Returns
     -------
     pandas.DataFrame
         A row for each step of the ECDF of each method and cost:
 
-        - ``method``: label of the method;
+        - ``method``: label of the method, or of a row of the ranking that two conditions of the
+          learner share, such as ``dual-process (EC1, EC4)``;
         - ``spend``: the cost: ``trials``, ``forward_kinematics`` (evaluations) or ``solve_s``
           (seconds). The last two are spread evenly over the trials of a run;
         - ``budget``: budget at which the ECDF rises, in the unit of the cost;
-        - ``share``: value of the ECDF from this budget on: on each task, the fraction of pairs of
-          a run and a target in which the run reached the target within the budget; averaged over
-          tasks.
+        - ``share``: value of the ECDF at this budget: the fraction of pairs of a run and a target
+          in which the run reached the target within the budget, computed on each task and averaged
+          over tasks.
 
         A method that reaches no target has one row for each cost, with share 0 and an infinite
-        budget. A method whose cost is unknown on a task has no rows for this cost.
+        budget. A method whose cost is unknown for all runs on a task has no rows for this cost.
 
     Raises
     ------
     CoarticError
-        - The folder is not a results folder.
+        - The folder is not a results folder, or runs of its suite are missing.
         - It has runs in several worlds, or in a world with noise.
         - A target is not above 0 and up to 1.
         - No task has a best known reward above the reward of the corrective process alone.
@@ -419,9 +429,9 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     frame : DataFrame
         A row for each improvement of a run (or only a row for its end), with the columns
 
-        - ``method``, ``task`` and ``run``: names of the method and the task, and name or number of
-          the run. If there is a column ``setting``, each setting of a method is treated as a method
-          of its own;
+        - ``method``, ``task`` and ``run``: names of the method and of the task, and name or number
+          of the run. If there is a column ``setting``, each setting of a method is treated as a
+          method of its own;
         - ``trials``: number of trials that the run had made, from 1;
         - ``reward``: best reward of the run so far, negative ticks; NaN for a failed run;
         - ``best_known``: best known reward of the task, negative ticks.
@@ -435,21 +445,23 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
 
         - ``method``: name of the method;
         - ``trials``: number of trials at which the ECDF rises;
-        - ``share``: value of the ECDF from this number of trials on: on each task, the fraction of
-          pairs of a run and a target in which the run reached the target within these trials;
-          averaged over tasks.
+        - ``share``: value of the ECDF at this number of trials: the fraction of pairs of a run and
+          a target in which the run reached the target within these trials, computed on each task
+          and averaged over tasks.
 
         All tasks have the same weight, whatever their numbers of runs. Tasks without a best known
-        reward are left out. A run without a reward reaches no target. On a task without runs of the
-        method, no target is reached. A method that reaches no target has one row, with share 0 and
-        infinite trials.
+        reward are left out. A run without a reward reaches no target. If a method has no runs on a
+        task, its fraction on this task is 0. A method that reaches no target has one row, with
+        share 0 and infinite trials.
 
     Raises
     ------
     CoarticError
-        - A column is missing, or a reward is wrong (:func:`ranking`).
-        - ``trials`` is below 1, or the reward of a run falls.
-        - A target is not from 0 to 1.
+        - A column is missing, a reward is wrong, a task has several best known rewards, or runs are
+          in different worlds (:func:`.ranking`).
+        - ``trials`` is missing or below 1.
+        - The reward of a run falls, or a run has two different rewards after the same trials.
+        - There are no targets, or a target is not from 0 to 1.
         - All entries of column ``best_known`` are missing.
 
     Examples

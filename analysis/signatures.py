@@ -5,8 +5,8 @@ A signature of coarticulation is a number for each run of a method on a task (:d
 
 Notation, for run i and goal g = 1..G:
 
-- The run hits the goal at configuration q(i, g) with hand h(i, g), t(i, g) ticks after the previous
-  goal. q(i, 0) is the start of the task.
+- The run hits the goal at configuration q(i, g) with hand h(i, g), t(i, g) ticks after the hit of
+  the previous goal. q(i, 0) is the configuration at the start of the task.
 - The corrective process alone, with the hands of run i, takes c(i, g) ticks for goal g.
 - A reach by the corrective process from q to goal g with hand h takes r(q, g, h) ticks, and ends at
   configuration R(q, g, h).
@@ -17,8 +17,8 @@ The first two coordinates of a configuration are in length units (base), and all
 (joints). Distances between configurations mix the two units, as the joint-space distance of the
 model does.
 
-Permutation tests exchange whole runs. Under the null hypothesis that the context has no effect,
-runs are exchangeable. The tests assume no particular distribution.
+Permutation tests exchange whole runs, which are exchangeable under the null hypothesis. The tests
+assume no particular distribution.
 """
 
 from __future__ import annotations
@@ -69,13 +69,13 @@ class Solutions:
     run_ids: tuple[str, ...] = ()
     """Ids of the runs, in the order of ``runs``; empty if the runs have no ids."""
     unfinished: int = 0
-    """Number of recorded trials in which not all goals were hit; these trials are not among
-    ``runs``. It is 0 for runs of a method."""
+    """Number of recorded trials in which not all goals were hit. These trials are not among
+    ``runs``. The number is 0 for runs of a method."""
     deterministic: bool = False
     """True if the method is deterministic, so that all its runs on this task are equal."""
     model: MotionModel = PAPER
-    """Motion model, without motor noise, with which the runs were executed. The reaches of the
-    corrective process to which they are compared have the same model."""
+    """Motion model, without motor noise, with which the runs were executed. The corrective process,
+    with which the runs are compared, has the same model."""
 
     @cached_property
     def hands(self) -> NDArray[np.int64]:
@@ -105,8 +105,8 @@ class Solutions:
         """Ticks of each subtask minus those of the corrective process alone, shape ``(n, G)``.
 
         In the notation of the module: t(i, g) − c(i, g). The corrective process uses the hand
-        sequence of the run. If it does not complete the task with these hands, all values of the
-        run are NaN.
+        sequence of the run. If the corrective process does not complete the task with these hands,
+        all values of the run are NaN.
         """
         hand_sequences = {run.hands for run in self.runs}
         references = {
@@ -120,15 +120,15 @@ class Solutions:
 
 
 def initial_solution(task: Task, model: MotionModel = PAPER) -> Execution | None:
-    """Return the execution of the corrective process alone with a task's initial hands, or None.
+    """Execute the corrective process alone with a task's initial hands.
 
-    ``model`` is a motion model without noise. The result is None if
+    ``model`` is a motion model without noise. The initial hands are a hand sequence, or a policy
+    that finds one (:func:`coartic.initial_hands`). The result is None if
 
-    - the task names its initial hands, and the corrective process does not complete the task with
-      them;
-    - the task has a policy instead, and the corrective process completes the task with no hand
-      sequence that the policy allows;
-    - the task has a policy instead, and there are more than 4,096 hand sequences to try.
+    - the task names a hand sequence, and the corrective process does not complete the task with it;
+    - the task names a policy, and the corrective process completes the task with no hand sequence
+      that the policy allows;
+    - the task names a policy, and there are more than 4,096 hand sequences to try.
     """
     try:
         execution = corrective_trial(task, initial_hands(task, model=model), model=model)
@@ -145,7 +145,7 @@ def _other(hand: Hand) -> Hand:
 def isolated_reaches(
     task: Task, q: Array, goals: ArrayLike, hands: ArrayLike, model: MotionModel = PAPER
 ) -> tuple[Array, Array]:
-    """Reach for single goals by the corrective process, each reach on its own.
+    """Compute reaches of the corrective process for single goals, each on its own.
 
     The results are r(q, g, h) and R(q, g, h) in the notation of this module.
 
@@ -158,24 +158,23 @@ def isolated_reaches(
     goals : array_like of int
         Number of the goal of each reach, from 1. The shape must broadcast to ``q.shape[:-1]``.
     hands : array_like of int
-        Hand of each reach, as its index in HANDS: 0 for left, 1 for right. The shape must broadcast
-        to ``q.shape[:-1]``.
+        Hand of each reach: 0 for left, 1 for right. The shape must broadcast to ``q.shape[:-1]``.
     model : MotionModel
         Motion model without noise.
 
     Returns
     -------
     ndarray, shape (...)
-        Ticks of each reach: 0 if the hand is within the goal at the start, and NaN if the reach
-        ends without a hit.
+        Ticks of each reach: 0 if the hand is in the goal at the start, and NaN if the reach ends
+        without a hit.
     ndarray, shape (..., dof)
         Configuration at the end of each reach, in length units and rad.
 
     Raises
     ------
     ValueError
-        A number of a goal is out of range, a hand is neither 0 nor 1, shapes do not fit, or the
-        model has motor noise.
+        A number of a goal is out of range, a hand is neither 0 nor 1, shapes do not fit, an entry
+        of ``q`` is not finite, or the model has motor noise.
     """
     q, numbers = np.asarray(q), 1 + np.arange(len(task.goals))
     shape = q.shape[:-1]
@@ -203,7 +202,7 @@ def isolated_reaches(
 
 
 def gain_at_next(runs: Solutions) -> Array:
-    """Return the ticks that each posture saves for the next goal.
+    """Return how many ticks the posture at each goal saves on the way to the next goal.
 
     The result has shape ``(n, G − 1)``. For run i and goal g < G, the value is
 
@@ -217,7 +216,8 @@ def gain_at_next(runs: Solutions) -> Array:
       movements of the idle arm have no effect.
 
     The value is positive if the corrective process reaches the next goal in fewer ticks from q''
-    than from q'. It is NaN if one of the three reaches ends without a hit.
+    than from q'. It is NaN if one of these three reaches of the corrective process ends without a
+    hit.
     """
     task, hands = runs.task, runs.hands
     goals = 1 + np.arange(len(task.goals))
@@ -242,11 +242,11 @@ def ticks_slower(runs: Solutions) -> Array:
 
     r(q(i, g − 1), g, h(i, g)) − min over the task's hands h of r(q(i, g − 1), g, h).
 
-    Both reaches start in the configuration in which the previous goal was hit. The first term is
-    the number of ticks that the corrective process needs with the chosen hand, and the second term
-    is the number that it needs with the fastest hand. The value is 0 if the chosen hand is the
-    fastest, and above 0 if another hand is faster. It is infinite if the reach with the chosen hand
-    ends without a hit.
+    Both reaches start in the configuration in which the previous goal was hit, or at the start of
+    the task. The first term is the number of ticks that the corrective process needs with the
+    chosen hand, and the second term is the number that it needs with the fastest hand. The value is
+    0 if the chosen hand is the fastest, and above 0 if another hand is faster. It is infinite if
+    the reach with the chosen hand ends without a hit.
     """
     goals = 1 + np.arange(len(runs.task.goals))
     isolated = np.full((len(HANDS), *runs.hands.shape), np.inf)
@@ -260,7 +260,7 @@ def ticks_slower(runs: Solutions) -> Array:
 
 
 def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
-    """Return how much nearer the idle hand is to its next goal, at each goal.
+    """Return how much nearer the idle hand is to its next goal, at each hit.
 
     At the hit of goal g, the idle hand is the hand that does not hit goal g. The value is
 
@@ -270,8 +270,8 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
 
     - d(g) is the distance, at the hit of goal g in ``run``, between the idle hand and the next goal
       that this hand hits;
-    - d_held(g) is the same distance if the joints of the idle arm were still as they were at the
-      last hit by the idle hand, or at the start of the task;
+    - d_held(g) is the distance that would result if the joints of the idle arm were as at the last
+      hit by the idle hand (or at the start of the task), with the base as in ``run``;
     - d_initial(g) is the distance of the same hand to the same goal at the hit of goal g in
       ``initial``.
 
@@ -286,10 +286,10 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
     Returns
     -------
     ndarray, shape (G,)
-        A fraction for each goal. It is NaN if the idle hand hits no later goal (always under
-        exploration condition 1), or if d_initial(g) is 0. Otherwise it is 0 if the joints of the
-        idle arm have not moved (always under condition 3), even if the base has moved. It is
-        negative if the idle arm has moved its hand away from its next goal.
+        A fraction for each goal. It is NaN if the idle hand hits no later goal (as always under
+        exploration condition EC1), or if d_initial(g) is 0. Otherwise it is 0 if the joints of the
+        idle arm have not moved since that last hit (as always under EC3), even if the base has
+        moved. It is negative if the idle arm has moved its hand away from its next goal.
     """
     now, hands = run.configurations, hands_of(run.hands)
     held = np.array(now)
@@ -316,10 +316,10 @@ class Signature:
     """A signature of coarticulation, with the words and formats of tables and pages for it."""
 
     name: str
-    """Name, such as ``other arm``. Names of columns have underscores instead of spaces."""
+    """Name, such as ``other arm``."""
     each: Callable[[Solutions], Array]
     """Function of n runs that returns the signature of each run, shape ``(n,)``. A value is NaN for
-    a run without the signature. The array is empty if there are no runs."""
+    a run without the signature."""
     heading: str
     """Heading of the signature's column in tables, with its unit."""
     decimals: int
@@ -327,10 +327,10 @@ class Signature:
     words: str
     """Short description of what the signature measures, with its unit."""
     definition: str
-    """Definition of the signature on the site, which follows its name and unit there."""
+    """Definition of the signature in the documentation, where it follows the name and unit."""
     in_latex: str = ""
-    """Columns that LaTeX tables also have: ``value`` (the method's), ``value and control`` (the
-    method's and that of random search), or empty for none."""
+    """Columns of the signature in LaTeX tables: ``value`` (mean of the method), ``value and
+    control`` (means of the method and of random search), or empty for no column."""
     by_hands: bool = True
     """True if runs are only compared with runs of random search with the same hand sequence."""
 
@@ -341,25 +341,26 @@ class Signature:
 
 
 def hand(runs: Solutions) -> Array:
-    """Return the share of goals that a run hits with a slower hand, shape ``(n,)``.
+    """Return the share of goals that each run hits with a slower hand, shape ``(n,)``.
 
     The chosen hand is slower if the corrective process would reach this goal, on its own, in fewer
-    ticks with another hand. For run i, the share is 1 minus the mean over the goals g < G of a(i,
-    g) (:func:`as_in_isolation`), a fraction. The last goal is left out. The share is NaN on a task
-    for one hand, and on a task with one goal.
+    ticks with another hand, or would not reach it with the chosen hand. For run i, the share is 1
+    minus the mean of a(i, g) over the goals g < G (:func:`as_in_isolation`), a fraction. The last
+    goal is left out. The share is NaN on a task for one hand, and on a task with one goal.
     """
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
 
 
 def as_in_isolation(runs: Solutions) -> Array:
-    """Return whether each goal is hit with the hand that is fastest for it alone.
+    """Return whether each goal is hit with the hand that is fastest for this goal alone.
 
     The result a(i, g) has shape ``(n, G)``. It is 1 if
 
     r(q(i, g − 1), g, h(i, g)) = min over the task's hands h of r(q(i, g − 1), g, h),
 
-    and 0 otherwise. All values are NaN on a task for one hand.
+    and 0 otherwise, also if the reach with hand h(i, g) ends without a hit. All values are NaN on a
+    task for one hand.
     """
     if not runs.runs or len(runs.task.hands) < 2:
         return np.full((len(runs.runs), len(runs.task.goals)), np.nan)
@@ -387,12 +388,13 @@ def other_arm(runs: Solutions) -> Array:
 
 
 def arm(runs: Solutions) -> Array:
-    """Return the mean number of ticks that postures save for the next goal.
+    """Return how many ticks postures save on the way to the next goal, on average.
 
-    The posture is compared with the posture in which the corrective process would have hit the
-    goal. Only the base and the arm that hits the goal are considered. The result is a mean for each
-    run, in ticks, shape ``(n,)``: the mean of :func:`gain_at_next` over the goals g < G. It is NaN
-    on a task with one goal, and for a run in which a value of :func:`gain_at_next` is NaN.
+    The posture at each goal is compared with the posture in which the corrective process would have
+    hit the goal. Only the base and the arm that hits the goal are considered. The result is a mean
+    for each run, in ticks, shape ``(n,)``: the mean of :func:`gain_at_next` over the goals g < G.
+    It is NaN on a task with one goal, and for a run in which a value of :func:`gain_at_next` is
+    NaN.
     """
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
@@ -480,9 +482,9 @@ SIGNATURES = {
         ),
     )
 }
-"""Maps the name of each signature to the signature, in the order of tables. In the notation of this
-module, ``first`` is t(i, 1) − c(i, 1), and ``whole`` is the sum over g of c(i, g) − t(i, g). Both
-are NaN if the corrective process does not complete the task with the hands of the run."""
+"""Maps the name of each signature to the signature, in the order of columns. In the notation of
+this module, ``first`` is t(i, 1) − c(i, 1), and ``whole`` is the sum over g of c(i, g) − t(i, g).
+Both are NaN if the corrective process does not complete the task with the hands of the run."""
 
 
 IN_MEMORY = 500
@@ -492,7 +494,7 @@ IN_MEMORY = 500
 def _groups(*groups: Numbers) -> list[Array]:
     """Return groups of runs as arrays of float64, shape ``(runs, dof)`` each.
 
-    Raises ValueError if a group has a wrong shape or no run, or if the groups differ in ``dof``.
+    Raises ValueError if an array has another shape or no run, or if the arrays differ in ``dof``.
     """
     shapes = [np.shape(group) for group in groups]
     if any(len(shape) != 2 or shape[1:] != shapes[0][1:] or 0 in shape for shape in shapes):
@@ -508,7 +510,7 @@ def distance_of_means(first: Array, second: Array) -> float:
 
     ``first`` and ``second`` contain the configurations of the runs in the two contexts, shape
     ``(runs, dof)`` each. The distance ‖mean(first) − mean(second)‖ mixes length units and rad.
-    Raises ValueError for other shapes.
+    Raises ValueError for other shapes, and for a context without runs.
     """
     first, second = _groups(first, second)
     return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
@@ -537,7 +539,7 @@ def standardised_posture_difference(first: Array, second: Array) -> float:
     Raises
     ------
     ValueError
-        An array has a wrong shape.
+        An array has a wrong shape or no rows.
     """
     first, second = _groups(first, second)
     freedom = len(first) + len(second) - 2
@@ -557,7 +559,7 @@ def posture_difference_below(
     standardised: bool = True,
     resamples: Resamples = RESAMPLES,
 ) -> float:
-    """Test whether the posture difference of two contexts is below a bound, by the bootstrap.
+    """Test by the bootstrap whether the posture difference of two contexts is below a bound.
 
     Each bootstrap sample draws runs with replacement within each context. p = (1 + number of
     bootstrap samples whose posture difference is at least ``bound``) / (1 + ``resamples``). Noise
@@ -568,13 +570,14 @@ def posture_difference_below(
     first, second : array_like, shape (runs, dof)
         Configurations in the two contexts, in length units and rad.
     bound : float
-        The bound: in SDs if ``standardised``, otherwise in the unit of the coordinates.
+        The bound: in standard deviations (SD) if ``standardised`` is True, otherwise in the unit of
+        the coordinates.
     rng : numpy.random.Generator
         Generator of the bootstrap samples.
     standardised : bool
         True if the posture difference is :func:`standardised_posture_difference`, False if it is
-        :func:`distance_of_means`. If True, a bootstrap sample whose SD is 0 is treated as one whose
-        posture difference is at least ``bound``.
+        :func:`distance_of_means`. If True, the posture difference of a bootstrap sample with SD 0
+        counts as at least ``bound``.
     resamples : int
         Number of bootstrap samples.
 
@@ -586,7 +589,7 @@ def posture_difference_below(
     Raises
     ------
     ValueError
-        An array has a wrong shape.
+        An array has a wrong shape or no rows.
     """
     groups = _groups(first, second)
     if min(map(len, groups)) < 2:
@@ -618,7 +621,8 @@ def permutation_p(
     rng : numpy.random.Generator
         Generator of the permutations.
     resamples : int
-        Largest number of permutations.
+        Largest number of permutations. If there are more ways to divide the runs, this number of
+        random permutations is used.
 
     Returns
     -------
@@ -628,7 +632,7 @@ def permutation_p(
     Raises
     ------
     ValueError
-        An array has a wrong shape.
+        An array has a wrong shape or no rows.
     """
     first, second = _groups(first, second)
     if min(len(first), len(second)) < 2:
@@ -676,7 +680,7 @@ def beyond_p(
     Raises
     ------
     ValueError
-        A method does not have two contexts, or an array has a wrong shape.
+        A method does not have two contexts, or an array has a wrong shape or no rows.
 
     Examples
     --------
@@ -727,9 +731,8 @@ def _distances(first: Array, second: Array) -> Array:
 
 
 NEXT_APART = 0.1
-"""Smallest distance between the mean next postures of two contexts for which a lean is computed.
-
-The distance mixes length units and rad."""
+"""Smallest distance between the mean next postures of two contexts for which a lean is computed, in
+length units and rad. The next posture is the posture at the goal after the shared goal."""
 STANDARD_ERRORS = 3
 """Smallest distance between the mean next postures of two contexts, in its standard errors, for
 which a lean is computed."""
@@ -739,17 +742,18 @@ difference is computed."""
 
 
 class Lean(NamedTuple):
-    """Lean of postures at a shared goal and at the start, as fractions."""
+    """Leans of postures at a shared goal and at the start, as fractions (:func:`lean`)."""
 
     more: Estimate
-    """Lean at the shared goal minus lean at the start, with its interval for other runs. ``n`` has
-    the numbers of runs in the two contexts. Interpret this number, not the two leans."""
+    """Lean at the shared goal minus lean at the start, with its interval for other runs. ``n`` is a
+    tuple of the numbers of runs in the two contexts. Interpret this number, not the two leans."""
     at_goal: float
     """Lean of the postures at the shared goal."""
     at_start: float
     """Lean of the postures in which the movements to the shared goal start. It is the control."""
     apart: float
-    """Distance between the mean next postures of the two contexts, in length units and rad."""
+    """Distance between the mean next postures of the two contexts, in length units and rad. With
+    ``toward``, it is the length of the mean of ``toward``."""
 
 
 def lean(
@@ -783,8 +787,9 @@ def lean(
     The postures p and n of the same run share the noise of this run, which would look like a lean.
     Therefore the runs are divided into odd and even runs. The lean is computed twice, with p from
     the odd runs and n from the even runs, and the other way round, and the two results are
-    averaged. Noise in n_A − n_B makes a lean smaller. With four coordinates, a lean that is only
-    just applicable is smaller by a ninth; any other lean is smaller by less.
+    averaged. Noise in n_A − n_B makes a lean smaller. If ‖n_A − n_B‖ is just three standard errors,
+    the lean is smaller by about 11 % with four equally noisy coordinates, and by 14 % with six. If
+    ‖n_A − n_B‖ is larger, the lean is smaller by less.
 
     All numbers except ``apart`` are NaN if the lean is not applicable, that is, if
 
@@ -797,13 +802,13 @@ def lean(
     ----------
     first, second : array_like, shape (runs, 3, k)
         Three postures of each run in context A and in context B: at the start of the movement to
-        the shared goal, at the shared goal, and at the next goal. The k coordinates are those that
-        move the hand that hits the shared goal, in length units and rad.
+        the shared goal, at the shared goal, and at the next goal. The k coordinates, in length
+        units and rad, are usually those that move the hand that hits the shared goal.
     rng : numpy.random.Generator
-        Generator of the resamples.
+        Generator of the bootstrap samples.
     toward : array_like, shape (m, k), optional
-        Values of n_A − n_B from m other sources, such as other people. Their mean then replaces
-        n_A − n_B, and p_A and p_B are means over all runs.
+        Values of n_A − n_B from m other sources, such as other people. If this is passed, the mean
+        of these values replaces n_A − n_B, and p_A and p_B are means over all runs.
     deterministic : bool
         True if all runs of a context are equal by construction, so that one run is enough.
     resamples : int
@@ -812,17 +817,17 @@ def lean(
     Returns
     -------
     Lean
-        The leans, as fractions, with the interval of their difference. The interval is a percentile
-        interval of bootstrap samples. The odd runs of each context are resampled, and the even
-        runs separately (with ``toward``, all runs of each context). In a group of m runs, the
+        The leans, as fractions, with the 95 % interval of their difference. The interval is a
+        percentile interval of bootstrap samples. In each context, the odd runs and the even runs
+        are resampled separately (with ``toward``, all runs together). In a group of m runs, the
         deviations of bootstrap means are multiplied by √(m / (m − 1)). There is no interval if a
         context has fewer than five runs, or if ``deterministic`` is True.
 
     Raises
     ------
     ValueError
-        An array has a wrong shape or is empty, the two contexts have different numbers of
-        coordinates, or a posture is not finite.
+        An array has a wrong shape or is empty, the contexts have different numbers of coordinates,
+        or a posture in ``first`` or ``second`` is not finite.
 
     Examples
     --------
@@ -894,7 +899,7 @@ def lean(
 def _postures(runs: Numbers) -> Array:
     """Return the postures of runs as an array of shape ``(runs, 3, k)``.
 
-    Raises ValueError for another shape, and for values that are not finite.
+    Raises ValueError for another shape, for no runs, and for values that are not finite.
     """
     postures = np.asarray(runs, np.float64)
     if postures.ndim != 3 or postures.shape[1] != 3 or not postures.size:
@@ -934,7 +939,7 @@ def _means_drawn(runs: Array, rng: np.random.Generator, resamples: int) -> Array
 
 SAME = 0.01
 """Posture difference, in length units and rad, below which two postures count as the same. It is
-the length of a step of the robot in the paper's model."""
+the length of a step in the paper's model."""
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
@@ -948,10 +953,10 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     Returns
     -------
     list of (str, str, int)
-        For each pair, the names of both tasks and the number n of shared goals: goals at the
-        beginning that are the same in both tasks, and are not the last goal of a task. A pair is
-        left out if n is 0, if all goals of the two tasks are equal, or if the tasks differ in
-        robot, start, radius of the goals, hands or locked base.
+        For each pair, the names of both tasks and the number n of shared goals. The shared goals
+        are the goals at the beginning that are the same in both tasks, without the last goal of
+        each task. A pair is left out if n is 0, if all goals of the two tasks are equal, or if the
+        tasks differ in robot, start, radius of the goals, hands or locked base.
     """
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
@@ -1010,17 +1015,17 @@ def coordinates(task: Task, hand: Hand, part: Part) -> Array:
 
 
 def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
-    """Divide a difference of configurations into a motor-equivalent part and the other part.
+    """Return the sizes of the motor-equivalent part of a posture difference and of the rest.
 
     The motor-equivalent part of a difference Δq is in the null space of the Jacobian J: to first
-    order, it does not move the hand. The other part is in the row space of J. Both are per
+    order, it does not move the hand. The rest is in the row space of J. Both sizes are per
     dimension: ‖Nᵀ Δq‖ / √dim N and ‖Rᵀ Δq‖ / √dim R, where N and R are orthonormal bases of the
-    null space and of the row space. If Δq has a random direction, the squares of both parts have
-    the same expectation. A difference between contexts is called motor-equivalent if the first part
-    is larger than the second, so that most of the difference does not move the hand.
+    null space and of the row space. If Δq has a random direction, the squares of both sizes have
+    the same expectation. A difference between contexts is called motor-equivalent if the first size
+    is larger than the second.
 
-    Caveat: if differences are small, the radius of the goal bounds the second part, because the
-    hand is inside the goal in both contexts. Nothing bounds the first part.
+    Caveat: if differences are small, the radius of the goal bounds the size of the rest, because
+    the hand is inside the goal in both contexts. Nothing bounds the motor-equivalent part.
 
     Parameters
     ----------
@@ -1032,8 +1037,8 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
     Returns
     -------
     (float, float)
-        The motor-equivalent part and the other part, in length units and rad. A part is NaN if its
-        space has dimension 0.
+        Size of the motor-equivalent part, and size of the rest, in length units and rad. A size is
+        NaN if its space has dimension 0.
 
     Raises
     ------
@@ -1073,10 +1078,12 @@ class TwoContexts:
         Hand that hits the goal in the compared runs.
     part : {"all", "base", "joints"}
         Coordinates that are compared: all of them, the two of the base (length units), or the
-        joints of the arm of ``hand`` (rad). The posture difference, the lean and their tests are
-        computed in these coordinates; :attr:`parts` is always computed from all coordinates. The
-        lean of a part is measured along the difference of the next postures in the same
-        coordinates. Therefore the leans of base and joints do not add up to the lean of all.
+        joints of the arm of ``hand`` (rad). The posture difference, its tests and the lean are
+        computed in these coordinates. There are two exceptions: for ``"all"``, the lean is computed
+        in the coordinates that move the hand (:func:`movable`); :attr:`parts` is always computed in
+        those coordinates. The lean of a part is measured along the difference of the next postures
+        in the same coordinates. Therefore the leans of base and joints do not add up to the lean of
+        all.
 
     Raises
     ------
@@ -1085,10 +1092,11 @@ class TwoContexts:
 
     Examples
     --------
-    >>> study = coartic.analysis.load("shipped")  # doctest: +SKIP
+    >>> study = coartic.analysis.load("shipped").worlds[""]  # doctest: +SKIP
     >>> runs = [study.executed(task, "dual-process/EC1") for task in ("ascending", "descending")]
     ... # doctest: +SKIP
-    >>> TwoContexts(*runs, 1, "right", part="joints").lean.more.value  # doctest: +SKIP
+    >>> contexts = TwoContexts(*runs, 1, "right", part="joints")  # doctest: +SKIP
+    >>> round(contexts.lean.more.value, 3)  # doctest: +SKIP
     -0.056
     """
 
@@ -1131,14 +1139,15 @@ class TwoContexts:
         return first[:, kept], second[:, kept]
 
     def of_part(self, part: Part) -> TwoContexts:
-        """Return a comparison of the same runs in another part of the posture (``part``)."""
+        """Return a comparison of the same runs in the coordinates of another ``part``."""
         return replace(self, part=part)
 
     @property
     def in_both(self) -> bool:
         """True if each context has at least one run that hits ``goal`` with ``hand``.
 
-        If it is False, :attr:`posture_difference` and the attributes computed from it raise
+        If it is False, :attr:`p` and :attr:`p_same` are NaN, and :attr:`posture_difference`,
+        :attr:`difference`, :attr:`standardised_posture_difference` and :attr:`lean` raise
         ValueError.
         """
         return all(map(len, self.configurations))
@@ -1167,9 +1176,9 @@ class TwoContexts:
         """The posture difference with its 95 % interval.
 
         The interval is the percentile interval of a bootstrap that resamples runs within each
-        context. There is no interval if a context has fewer than five runs, or if the method is
-        deterministic. Noise makes distances larger, so that the interval of a small difference
-        tends to be too high.
+        context; deviations are widened as in :func:`.lean`. There is no interval if a context has
+        fewer than five runs, or if the method is deterministic. Noise makes distances larger, so
+        that the interval of a small difference tends to be too high.
         """
         value, n = self.posture_difference, tuple(map(len, self.configurations))
         if min(n) < MIN_RUNS or self.first.deterministic:
@@ -1187,8 +1196,8 @@ class TwoContexts:
         two contexts that already exists at the shared goal. Its attribute ``more`` is this fraction
         minus the same fraction at the start of the movement. The coordinates are those of
         :func:`coordinates`; for ``"all"``, they are the coordinates that move the hand. In each
-        context, the next goal may be hit with either hand. Only the runs that hit it with the more
-        frequent hand are used.
+        context, only the runs that hit the next goal with the more frequent hand are used. Raises
+        IndexError if the shared goal is the last goal of a task.
         """
         kept = coordinates(self.first.task, self.hand, self.part)
         goal, hand = self.goal - 1, HANDS.index(self.hand)
@@ -1207,18 +1216,19 @@ class TwoContexts:
     def standardised_posture_difference(self) -> float:
         """Posture difference in pooled standard deviations within contexts.
 
-        It is NaN if all runs of each context have the same posture, or if each context has a single
-        run (:func:`.standardised_posture_difference`).
+        It is NaN if postures do not vary within either context, or if each context has a single run
+        (:func:`.standardised_posture_difference`).
         """
         return standardised_posture_difference(*self.configurations)
 
     @cached_property
     def parts(self) -> tuple[float, float]:
-        """Motor-equivalent part of the posture difference in all coordinates, and the other part.
+        """Sizes of the motor-equivalent part of the posture difference and of the rest.
 
-        The motor-equivalent part does not move the hand, to first order. Both parts are per
-        dimension, in length units and rad (:func:`motor_equivalence`). The Jacobian is that of the
-        mean posture of all compared runs.
+        The motor-equivalent part does not move the hand, to first order. Both sizes are per
+        dimension, in length units and rad (:func:`motor_equivalence`). They are computed in the
+        coordinates that move the hand (:func:`movable`), whatever ``part`` is. The Jacobian is that
+        of the mean posture of all compared runs.
         """
         task, joints = self.first.task, movable(self.first.task, self.hand)
         postures = self.of_part("all").configurations
@@ -1240,7 +1250,7 @@ class TwoContexts:
 
     @cached_property
     def p_same(self) -> float:
-        """p-value of the bootstrap test that the posture difference is below :data:`SAME`.
+        """p-value of the bootstrap test of whether the posture difference is below :data:`SAME`.
 
         The test is :func:`.posture_difference_below`. The p-value is NaN if a context has fewer
         than five compared runs.

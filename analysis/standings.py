@@ -1,8 +1,8 @@
 """Rank the methods of a study, and say why some methods are not ranked.
 
-A method is ranked if all its runs on all tasks of the ranking are solved, and if it was asked for
-the same number of trials as the other methods (:func:`ranking_budget`). Searches for the optimum
-are references and are not ranked.
+A method is ranked if it has runs on all tasks of the ranking, if all these runs are solved, and if
+it was asked for the same number of trials as the other methods (:func:`ranking_budget`). Searches
+for the optimum are references and are not ranked.
 """
 
 from __future__ import annotations
@@ -22,18 +22,17 @@ from coartic.runs.record import NOISE_RULE
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
-    """Return what the best known rewards of tasks are called in sentences, such as ``optimum``.
+    """Return the name of the best known rewards of tasks in sentences, such as ``optimum``.
 
     A reward is called *local* if it is not proven to be the optimum, and is known only from methods
-    of this folder. The name is
+    of this folder (:attr:`.BestKnown.only_here`). The name is
 
     - ``optimum`` if all rewards are proven, or if there are no tasks;
     - ``best known reward`` if at least one reward is not proven, and none is local;
     - ``best of this folder`` if all rewards are local.
 
-    If some rewards are local and others are not, the name is that of the rewards that are not
-    local, followed by ``or best of this folder``. Raises KeyError for a task without a best known
-    reward.
+    If some rewards are local and others are not, the name is that of the others alone, followed by
+    ``or best of this folder``. Raises KeyError for a task without a best known reward.
     """
     best = [study.optima[task] for task in tasks]
     others = [known.proven for known in best if known.proven or not known.only_here]
@@ -45,19 +44,19 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 
 
 NOT_HERE = "no runs in this world"
-"""Reason why a method is not ranked: it has runs only in other worlds of the folder."""
+"""Reason for not ranking a method that has runs only in other worlds of the folder."""
 ESTIMATES, COUNTS = ("gap", "share", "noisy_gap"), ("tasks", "runs", "failed")
 """Columns of :func:`.ranking` that are estimates with an interval, and columns that are counts."""
 _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "parameters", "information"]
-"""Columns of runs that no ranking uses. They are dropped to save memory for a large folder."""
+"""Columns of runs that no ranking uses. They are dropped to save memory in large folders."""
 
 
 @lru_cache(maxsize=4)
 def compared_runs(study: Study) -> pd.DataFrame:
     """Return the runs that the ranking uses, including failed runs.
 
-    These are the runs, on all tasks with a best known reward, of all methods except searches for
-    the optimum. The columns :data:`_OF_RECORD` are left out. The frame is cached: do not change it.
+    These are all runs on tasks with a best known reward, without the runs of searches for the
+    optimum. The columns :data:`_OF_RECORD` are left out. The frame is cached: do not change it.
     Raises CoarticError for a study of several worlds (:attr:`.Study.worlds`).
     """
     check_study(study)
@@ -70,7 +69,7 @@ def compared_runs(study: Study) -> pd.DataFrame:
 def runs_by_method(study: Study) -> dict[str, pd.DataFrame]:
     """Return a dict that maps each row of the ranking to its runs.
 
-    The keys are the names in column ``ranked_as`` of :func:`compared_runs`, in the order of
+    The keys are the values of column ``ranked_as`` of :func:`compared_runs`, in the order of
     :attr:`.Study.methods`. The dict is cached: do not change it.
     """
     by_method = dict([*compared_runs(study).groupby("ranked_as", sort=False)])
@@ -78,12 +77,12 @@ def runs_by_method(study: Study) -> dict[str, pd.DataFrame]:
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Select the runs of a method on given tasks from the runs that the ranking uses.
+    """Return the runs of a method on given tasks, including failed runs.
 
-    The runs are selected from :func:`compared_runs`, whose errors are raised; failed runs are
-    included. ``method`` is the label of the method, or the label of a row of the ranking. The frame
-    is empty if at least one of the tasks has no such run. It is therefore empty for a search for
-    the optimum, and if one of the tasks has no best known reward.
+    The runs are selected from :func:`compared_runs`. ``method`` is the label of the method, or the
+    label of a row of the ranking. If the method has no run on one of the tasks, the frame is empty.
+    It is also empty for a search for the optimum, and if one of the tasks has no best known reward.
+    Raises CoarticError for a study of several worlds.
     """
     runs, tasks = compared_runs(study), {*tasks}
     runs = runs[runs.task.isin(tasks) & ((runs.ranked_as == method) | (runs.label == method))]
@@ -91,7 +90,7 @@ def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
 
 
 def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return the distinct pairs of task and label of a method in ``runs``.
+    """Return the distinct pairs of a task and a label in ``runs``.
 
     The pairs are in the order in which they first appear.
     """
@@ -102,8 +101,8 @@ def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
 def ranked_tasks(study: Study) -> tuple[str, ...]:
     """Return the names of the tasks on which methods are ranked.
 
-    The names are in the order of the study. These are all tasks that have a best known reward, and
-    on which a method other than a search for the optimum was run.
+    These are all tasks that have a best known reward, and on which a method other than a search for
+    the optimum was run. The names are in the order of :attr:`.Study.tasks`.
     """
     tasks = {*compared_runs(study).task}
     return tuple(task for task in study.tasks if task in tasks)
@@ -113,15 +112,15 @@ def ranked_tasks(study: Study) -> tuple[str, ...]:
 def ranking_budget(study: Study) -> int | None:
     """Return the number of trials that ranked methods were asked for, or None.
 
-    The numbers of trials of a method are the values in column ``budget`` of the runs of the method.
+    Column ``budget`` of :func:`compared_runs` has the number of trials that each run was asked for.
     The result is
 
-    - None if no method has trials, or if a method has runs with different numbers of trials: the
+    - None if no method has trials, or if one method has runs with different numbers of trials: the
       study then compares these numbers;
-    - otherwise the number of trials that the last command asked for (or the file of the suite, if
-      the command named no number), if a method has this number of trials;
-    - otherwise the number of trials that the largest number of algorithms share; if several numbers
-      tie, the smallest of them.
+    - otherwise the number of trials that the last ``coartic run`` asked for (or the file of the
+      suite, if the command named no number), if a method has this number of trials;
+    - otherwise the number of trials that is most frequent among algorithms; if several numbers are
+      equally frequent, the smallest of them.
     """
     runs = compared_runs(study).dropna(subset="budget")
     if runs[["method", "budget"]].drop_duplicates().duplicated("method").any():
@@ -137,10 +136,10 @@ def ranking_budget(study: Study) -> int | None:
 def standings(study: Study) -> pd.DataFrame:
     """Rank the methods of a study by their mean gap.
 
-    A method is ranked if it solved all runs on all tasks of :func:`ranked_tasks`, and was asked for
-    the number of trials of :func:`ranking_budget`. The number of trials does not matter for a
-    method without trials, or if :func:`ranking_budget` returns None. A method that solved all runs
-    with another number of trials has a gap, but is not ranked.
+    A method is ranked if it has runs on all tasks of :func:`ranked_tasks`, if all these runs are
+    solved, and if it was asked for the number of trials of :func:`ranking_budget`. The number of
+    trials does not matter for a method without trials, or if :func:`ranking_budget` returns None. A
+    method that solved all runs with another number of trials has a gap, but is not ranked.
 
     Returns
     -------
@@ -148,15 +147,21 @@ def standings(study: Study) -> pd.DataFrame:
         A row for each method of :func:`runs_by_method`, indexed by label. Ranked methods come
         first, in ascending order of their gaps; methods that are not ranked follow. The frame has
         the columns of :func:`.ranking` and of :attr:`.Study.methods`. Column ``why`` is the reason
-        why a method is not ranked; it is empty for a ranked method. Column ``note`` says
+        why a method is not ranked; it is empty for a ranked method. Column ``note`` says, if it
+        applies,
 
-        - for a method from a file: how many trials its solved runs made, if this number differs
-          from the number that was asked for;
+        - how many trials the solved runs of a method from a file made, if this number differs from
+          the number that was asked for;
         - how many of a method's solutions, found in the paper's world, can fail with motor noise;
-        - in a world with noise, how many executions failed.
+        - how many executions failed in a world with noise.
 
-        The frame also contains a row for each method that has runs only in other worlds
-        (:attr:`.Study.elsewhere`), with the reason :data:`NOT_HERE`.
+        The frame also contains a row for each method, except searches for the optimum, that has
+        runs only in other worlds (:attr:`.Study.elsewhere`). The reason is then :data:`NOT_HERE`.
+
+    Raises
+    ------
+    CoarticError
+        The study has several worlds (:attr:`.Study.worlds`).
     """
     runs, budget = compared_runs(study), ranking_budget(study)
     elsewhere = study.elsewhere
@@ -200,10 +205,11 @@ def standings(study: Study) -> pd.DataFrame:
 
 
 def has_few_runs(study: Study, methods: Iterable[str], tasks: Iterable[str]) -> bool:
-    """Return True if a stochastic method has too few runs for a test.
+    """Return whether a stochastic method has fewer than five runs on one of the tasks.
 
-    ``methods`` are labels of methods, or labels of rows of the ranking. Deterministic methods among
-    them are not checked, because one run of them is exact.
+    So few runs are not enough for a test. ``methods`` are labels of methods, or labels of rows of
+    the ranking. Deterministic methods, and methods without runs on one of the tasks, are not
+    checked.
     """
     stochastic = study.methods.stochastic.astype(bool)
     drawn = [runs_on(study, method, tasks) for method in methods]
@@ -213,9 +219,10 @@ def has_few_runs(study: Study, methods: Iterable[str], tasks: Iterable[str]) -> 
 
 @lru_cache(maxsize=1_024)
 def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
-    """Return the names of the tasks on which all runs of a method are solved.
+    """Return the names of the tasks on which a method has runs, all of them solved.
 
-    ``method`` is the label of the method, or the label of a row of the ranking.
+    Only tasks with a best known reward are included. ``method`` is the label of the method, or the
+    label of a row of the ranking. The names are in the order of the runs.
     """
     runs = compared_runs(study)
     runs = runs[(runs.ranked_as == method) | (runs.label == method)]
