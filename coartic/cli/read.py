@@ -299,7 +299,7 @@ def _perform_again(
 
 
 def _describe_run(run: Row, code: str) -> None:
-    """Print the id, the task, the method, the seed, the parameters and the result of a run.
+    """Print what a run did: its method, task, parameters, seed and result.
 
     ``code`` is the present version of the method or, for a method from a file, the present hash of
     its code. If another version or other code made the run, this is printed, too.

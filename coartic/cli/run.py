@@ -261,7 +261,7 @@ def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
 
 
 def _list_runs(folder: Path) -> None:
-    """Print a table with a row for each stored run of the plan of a results folder."""
+    """Print a table of the stored runs in the plan of a results folder."""
     from coartic.runs.store import open_store
 
     with open_store(folder) as store:

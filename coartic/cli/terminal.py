@@ -171,7 +171,7 @@ class Display:
         self._show(lambda: doing)
 
     def line(self, *texts: str) -> None:
-        """Print lines that stay; on a terminal they stand above the line that is updated."""
+        """Print lines on standard error; on a terminal, above the line that is updated."""
         for text in texts:
             say(text, stream=sys.stderr)
 

@@ -35,9 +35,10 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files into a folder, and remove files of an earlier call that are not in ``files``.
+    """Write files into a folder, in place of the files of earlier calls.
 
-    Files that coartic did not write are never changed. Subfolders that become empty are removed.
+    Files of earlier calls that are not in ``files`` are removed, and so are subfolders that become
+    empty. Files that coartic did not write are never changed.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ _MAX_NAMED = 12  # largest number of names in a sentence
 def plain(text: str, most: int = MAX_REASON_LENGTH) -> str:
     """Convert a string to one printable line (:func:`one_line`) of limited length.
 
-    Blanks at both ends are removed. A line with more than ``most`` characters is cut to this
+    White space at both ends is removed. A line with more than ``most`` characters is cut to this
     length, and ends in ``…``.
 
     Examples
@@ -75,7 +75,7 @@ def escape(c: str) -> str:
 
 
 def pluralize(count: int, thing: str) -> str:
-    """Return a count with its noun, such as ``1 run`` or ``2 runs``; the plural adds an s."""
+    """Return a count with its noun, such as ``1 run`` or ``2 runs``."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
 
 

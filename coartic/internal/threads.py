@@ -65,9 +65,10 @@ def threads_for(jobs: int) -> int:
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
     """Call a function with slices of a range of indices, in parallel threads.
 
-    The slices cover ``range(count)``. There are at most as many slices as the environment variable
-    ``OMP_NUM_THREADS`` says or, if it is not set to a number, as the process may use cores. The
-    function returns when all calls have ended. If a call raises an error, the error is raised.
+    The slices cover ``range(count)``. The number of slices is at most the value of the environment
+    variable ``OMP_NUM_THREADS``. If that is not a number, it is at most the number of cores that
+    the process may use. The function returns when all calls have ended. If a call raises an error,
+    the error is raised.
 
     Parameters
     ----------

@@ -235,7 +235,7 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 
 def _defaults(method: type[Method]) -> dict[str, Any]:
-    """Return a dict that maps the parameters of a method to their defaults, as plain data.
+    """Return a dict that maps a method's parameters to their defaults, as plain data.
 
     The value of a parameter without a default is None. Raises CoarticError for a default that is
     infinite or NaN.
@@ -311,7 +311,7 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
 
 @cache
 def load_file(path: Path, code: str = "") -> tuple[ModuleType, frozenset[str]]:
-    """Import a method file, and return its module and the names of the modules that it loads.
+    """Import a method file, and find out which modules are loaded with it.
 
     A process imports the file once for each ``code``, a hash of the code. The file and the user's
     modules are compiled from their source (:func:`.import_from`). Errors of the file are raised as

@@ -22,7 +22,7 @@ from coartic.tasks.task import Task
 
 @dataclass(frozen=True)
 class Cell:
-    """A method with its parameters on a task, and the budget of trials of a run."""
+    """A method with its parameters on a task, with a motion model and a trial budget."""
 
     task: Task
     method: MethodInfo
@@ -41,8 +41,7 @@ class Cell:
     def world(self) -> str:
         """Constants in :data:`.WORLD` that differ from the paper's; empty for the paper's world.
 
-        For example, ``motor_noise=0.01``. The world does not name other constants, such as
-        tolerances.
+        An example is ``motor_noise=0.01``. Other constants, such as tolerances, are not named.
         """
         return describe_parameters(differences(self.model))
 
@@ -60,7 +59,10 @@ class Cell:
 
     @property
     def trials(self) -> int | None:
-        """Parameter ``trials``, but at most :attr:`trial_budget`; None without this parameter."""
+        """Requested number of trials: parameter ``trials``, but at most :attr:`trial_budget`.
+
+        None if the method does not have this parameter.
+        """
         trials = trials_in(self.parameters)
         return min(trials, self.trial_budget or trials) or None
 

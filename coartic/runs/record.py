@@ -141,7 +141,7 @@ class Row:
         return failed is not None and self.rewards.count(None) > failed
 
     def part(self, name: str) -> list[Movement]:
-        """Return the movements of a part as a list, which is empty if the run lacks the part."""
+        """Return the list of movements of a part; empty if the run lacks the part."""
         return [*map(movement_from, self.movements.get(name, []))]
 
     def with_values(self, **values: Any) -> Row:
@@ -227,10 +227,10 @@ def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date
 
 
 def _corrections_by_tenth(details: Mapping[str, Any]) -> list[int] | None:
-    """Return the numbers of a learner's corrections in trial 0 and in each tenth of later trials.
+    """Return a learner's numbers of corrections, by parts of its trials.
 
-    ``details`` are those of the run. The result is a list of 11 numbers, or None if ``details`` do
-    not contain such a list.
+    The result is a list of 11 numbers: the number in trial 0, and that in each tenth of the later
+    trials. It is None if ``details``, the details of the run, do not contain such a list.
     """
     counts = details.get(CORRECTIONS_BY_TENTH)
     if not isinstance(counts, list) or len(counts) != 11:
@@ -240,10 +240,10 @@ def _corrections_by_tenth(details: Mapping[str, Any]) -> list[int] | None:
 
 
 def _practice_of(rewards: Sequence[int | None]) -> str:
-    """Return the mean ticks of the completed trials in each tenth of the trials, as JSON.
+    """Return the mean ticks in each tenth of the trials, as JSON.
 
-    The JSON is a list of ten numbers, with null for a tenth without a completed trial. ``rewards``
-    are those of all trials.
+    The JSON is a list of ten numbers: the mean over the completed trials of each tenth, or null for
+    a tenth without a completed trial. ``rewards`` are those of all trials.
     """
     tenths = np.array_split(np.array(rewards, np.float64), 10)
     means = [-float(np.nanmean(part)) if np.isfinite(part).any() else None for part in tenths]
@@ -253,9 +253,9 @@ def _practice_of(rewards: Sequence[int | None]) -> str:
 def _result_of(
     status: str, movements: Mapping[str, Sequence[list[Any]]], rewards: Sequence[int | None]
 ) -> str:
-    """Return a hash of the status, the movements and the stored rewards of a run: 16 hex digits.
+    """Return a hash of the status, the movements and the stored rewards of a run.
 
-    Times and counts are not hashed.
+    The hash has 16 hex digits. Times and counts are not hashed.
     """
     stated = [[part, *data] for part in PARTS for data in movements.get(part, [])]
     content = json.dumps([status, *stated]).encode()

@@ -53,7 +53,7 @@ def open_results(folder: Path) -> AbstractContextManager[Store]:
 
 
 def shipped_hashes() -> dict[str, str]:
-    """Return a dict that maps each shipped suite to the SHA-256 hash of its compressed file.
+    """Return a dict that maps shipped suites to SHA-256 hashes of their compressed files.
 
     The hashes are read from ``SHA256SUMS``. Raises OSError or ValueError if that fails.
     """

@@ -222,10 +222,11 @@ class Store:
         return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
     def count_outdated_runs(self) -> Counter[tuple[str, str, str]]:
-        """Count the stored runs of the plan that another version of the method made.
+        """Count the stored runs that another version of a planned method made.
 
-        The result is a Counter whose keys are triples: the id of the method, the version (or hash
-        of the code) that made the runs, and the version (or hash of the code) in the plan.
+        A run is counted if it differs from a run of the plan only in the version of the method. The
+        result is a Counter whose keys are triples: the id of the method, the version (or hash of
+        the code) that made the runs, and the version (or hash of the code) in the plan.
         """
         query = """SELECT now.method, old.code, now.code, count(*) FROM suite
             JOIN cells AS now ON now.runs IS NOT NULL
@@ -235,9 +236,9 @@ class Store:
         return Counter({(name, old, now): count for name, old, now, count in self._rows(query)})
 
     def marks(self) -> dict[str, list[str]]:
-        """Return a dict that maps ids of methods to lists of warnings about their stored runs.
+        """Return a dict that maps ids of methods to lists of warnings about them.
 
-        Only runs of the plan are considered, and only methods with a warning are included. A
+        Only stored runs of the plan are considered, and only methods with a warning are included. A
         warning is a sentence that says one of the following:
 
         - A run was performed again with another result.
@@ -308,14 +309,17 @@ class Store:
         return int(self._rows(query)[0][0])
 
     def ids(self, prefix: str = "") -> list[str]:
-        """Return the ids that begin with ``prefix``, of all stored runs, also outside the plan."""
+        """Return the ids of stored runs that begin with ``prefix``.
+
+        Runs outside the plan are included.
+        """
         query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
         return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
     def solved(self) -> dict[str, list[str]]:
-        """Return a dict that maps the id of each cell to a list of the ids of its solved runs.
+        """Return a dict that maps ids of cells to lists of the ids of solved runs.
 
-        Solved runs have status ``ok``. Cells and runs outside the plan are included; cells without
+        A solved run has status ``ok``. Cells and runs outside the plan are included; cells without
         solved runs are left out.
         """
         by_cell = defaultdict[str, list[str]](list)
@@ -324,7 +328,7 @@ class Store:
         return dict(by_cell)
 
     def results(self) -> dict[str, str]:
-        """Return a dict that maps the ids of all stored runs to column ``result``, a hash."""
+        """Return a dict that maps the id of each stored run to its column ``result``."""
         return dict(self._rows("SELECT run_id, result FROM results"))
 
     # Writing and reading runs.
@@ -426,12 +430,13 @@ class Store:
             )
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs``: a row for each stored run of the plan, in the order of the plan.
+        """Return view ``runs`` as a data frame.
 
         Returns
         -------
         DataFrame
-            Columns :data:`.COLUMNS`, with nullable types.
+            A row for each stored run of the plan, in the order of the plan. The columns are those
+            of :data:`.COLUMNS`, with nullable types.
         """
         there = {*self._columns("asked")}
         missing = {"world": "'' AS world", "noisy_ticks": "NULL AS noisy_ticks"}
@@ -444,13 +449,14 @@ class Store:
         return self._frame(f"SELECT {', '.join(columns)} FROM asked ORDER BY position, run")
 
     def solutions(self) -> pd.DataFrame:
-        """Return view ``solutions``: a row for each movement of the plan's solutions.
+        """Return view ``solutions`` as a data frame.
 
         Returns
         -------
         DataFrame
-            Columns ``run_id``, ``order`` (from 0), ``goal`` (from 1), ``hand``, ``kind``, ``ticks``
-            and ``path`` (the target, or the waypoints of a path, as JSON), with nullable types.
+            A row for each movement of each solution in the plan. The columns are ``run_id``,
+            ``order`` (from 0), ``goal`` (from 1), ``hand``, ``kind``, ``ticks`` and ``path`` (the
+            target, or the waypoints of a path, as JSON), with nullable types.
         """
         return self._frame(_SOLUTIONS)
 
@@ -477,7 +483,7 @@ class Store:
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the id and the rewards of each run of the plan that has stored rewards.
+        """Yield the rewards of each run of the plan that has stored rewards.
 
         Yields
         ------
@@ -513,7 +519,7 @@ class Store:
         return [row[1] for row in self._rows(f"PRAGMA {schema}.table_info({table})")]
 
     def _insert(self, table: str, **row: Any) -> None:
-        """Insert a row into a table; if the table has ids, update the row with the same id."""
+        """Insert a row into a table, or update the row with the same id if there is one."""
         key = {"cells": "id", "environments": "id", "results": "run_id"}.get(table)
         names, marks = ", ".join(f'"{name}"' for name in row), ", ".join("?" * len(row))
         # Setting the key, even to its own value, would make SQLite check all rows that refer to it.
@@ -523,7 +529,10 @@ class Store:
         self._db.execute(statement, [*row.values()])
 
     def _rows(self, query: str, *values: object) -> list[Any]:
-        """Return the rows of a query as tuples; raise CoarticError if the file cannot be read."""
+        """Return the rows of a query as a list of tuples.
+
+        Raises CoarticError if the file cannot be read.
+        """
         with explain_errors(self.folder):
             return [tuple(row) for row in self._db.execute(query, values)]
 

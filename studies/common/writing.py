@@ -171,12 +171,12 @@ def fill_page(template: str | Path, **values: Any) -> str:
 
 
 def expect(holds: bool, what: str) -> str:
-    """Raise ValueError if a condition is false under which a sentence of a page is true.
+    """Raise ValueError if a condition on which a page relies is false.
 
     Parameters
     ----------
     holds : bool
-        The condition under which the sentence is true.
+        The condition.
     what : str
         The condition in words, for the error message.
 
