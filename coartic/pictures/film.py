@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 RATE = 12.5
 """Frames per second. In a GIF, a frame must last an integer number of hundredths of a second."""
 MAX_FRAMES = 125
-"""Largest number of frames at equal distances in a film; in a film of more ticks, the distance is
-several ticks. The ticks at which goals are hit, and the last tick, have further frames."""
+"""Largest number of equally spaced frames of a film. A film of more ticks does not show each tick,
+but it always shows the ticks at which goals are hit, and the last tick, in further frames."""
 PAUSE, HOLD = 6, 30
 """Number of frames for which a film stands still when a goal is hit, and at the end."""
 COLOURS = "#0072b2", "#c04a00"

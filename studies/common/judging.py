@@ -93,7 +93,7 @@ def two_sided_tests(samples: Mapping[Any, ArrayLike], resamples: int | None = No
           the value is False.
 
         Both columns of p-values are Holm-adjusted over all samples. A p-value is NaN if all tested
-        values are 0, or if there is only one.
+        values are 0, or if there is only one value.
     """
     values = {name: np.asarray(each, dtype=np.float64) for name, each in samples.items()}
     means = [each.mean() for each in values.values()]
