@@ -1,4 +1,4 @@
-"""coartic: computational motor control, from one kinematic robot to scored solutions.
+"""coartic: a benchmark of methods for computational motor control on one kinematic robot.
 
 This package contains the dual-process learner of Shah, Barto & Fagg (2013), *A Dual Process Account
 of Coarticulation in Motor Skill Acquisition*, and everything that other methods share with the
@@ -109,6 +109,6 @@ _HOMES = {
     "pictures.trajectories": ("Trajectory", "trajectory"),
 }
 HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name in names}
-"""Maps each public name of ``coartic`` to the module that defines it."""
+"""Dict that maps each public name of ``coartic`` to the module from which it is imported."""
 
 __getattr__, __dir__ = import_lazily(__name__, HOME)

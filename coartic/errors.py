@@ -1,7 +1,7 @@
 """Errors that a user can correct.
 
-The message of such an error says what is wrong, usually where, and what would be right. A command
-that fails with such an error prints the message and exits with code 2.
+The message of such an error says what is wrong and what would be right; usually it also says where
+the error is. A command that fails with such an error prints the message and exits with code 2.
 """
 
 
@@ -18,12 +18,13 @@ class SolutionError(CoarticError):
 
 
 class NotApplicableError(CoarticError):
-    """A method or condition does not apply to a task.
+    """A method or condition does not apply to a task or to a motion model.
 
-    For example, an exploration condition uses a hand that does not occur in the task or in the
-    first solution, or a search for the initial hands finds no sequence that completes the task.
+    For example, an exploration condition uses a hand that the task does not have, a first solution
+    uses a hand that the condition does not use, or a search for the initial hands finds no hand
+    sequence that completes the task.
     """
 
 
 class MissingExtraError(CoarticError, ImportError):
-    """A package of an extra, such as ``coartic[gym]``, is not installed."""
+    """A package that :mod:`coartic.gym` needs is not installed; the message names the extra."""

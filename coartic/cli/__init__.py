@@ -1,7 +1,7 @@
 """The command line ``coartic``.
 
-Each command is a function in :mod:`~coartic.cli.run` or :mod:`~coartic.cli.read`. Commands import
-most packages only when they are called, so that help and completion are fast.
+Each command is a function in :mod:`~coartic.cli.run` or :mod:`~coartic.cli.read`. A command imports
+most of the packages that it needs only when it is called, so that help and completion are fast.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ COMMANDS = (
     (read.draw, "results/quick --run 1a2b3c --initial --out race.gif"),
     (read.cite, "results/comparison --analysis"),
 )
-"""The commands in the order of the help, each with the arguments of its example."""
+"""Functions of the commands in the order of the help, each with the arguments of its example."""
 for command, example in COMMANDS:
     name = command.__name__.removesuffix("_")
     # Without \b the help would wrap the command.
@@ -71,7 +71,7 @@ def main() -> None:
     The exit code is
 
     - 0 after success;
-    - 1 if the command found something wrong, or after an error of the system;
+    - 1 if the command found something wrong, after an error of the system, or after a bug;
     - 2 after a CoarticError or wrong usage.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):

@@ -26,23 +26,24 @@ if TYPE_CHECKING:
 def file_or_folder(metavar: str, what: str, *names: str) -> Any:
     """Make a command-line option whose value is the path of a file or folder.
 
-    The file or folder need not exist. When the command line is parsed, an empty name raises
-    CoarticError. The parameters are those of :func:`option`.
+    The file or folder need not exist. An empty name raises CoarticError when the command line is
+    parsed. The parameters are the first three of :func:`option`.
     """
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
 
 def option(metavar: str, what: str, *names: str, words: Words | None = None) -> Any:
-    """Make a command-line option for a string, a number, or files that are read later.
+    """Make a command-line option for a string, a number or the names of files.
 
     Parameters
     ----------
     metavar : str
         Name of the value in the help, such as ``N``.
     what : str
-        Sentence on the option in the help.
+        Description of the option in the help.
     *names : str
-        Flags, such as ``"--out"``; by default a flag with the name of the function's parameter.
+        Flags, such as ``"--out"``. By default the flag is made from the name of the parameter of
+        the command.
     words : callable, optional
         Function that returns completions of an incomplete value (:mod:`coartic.cli.completion`).
 
@@ -72,7 +73,7 @@ def ranged_option(option: str, what: str, least: float, most: float) -> Any:
     option : str
         Flag, such as ``"--jobs"``.
     what : str
-        Sentence on the option in the help.
+        Description of the option in the help.
     least, most : float
         Smallest and largest allowed value.
     """
@@ -82,8 +83,9 @@ def ranged_option(option: str, what: str, least: float, most: float) -> Any:
 def parse_run_range(text: str) -> Any:
     """Parse a number of runs, ``20``, or a range of runs, ``50..99``.
 
-    A range includes both ends. Any other string is returned unchanged, and refused later by the
-    plan. Raises CoarticError for a range whose second number is lower than the first.
+    The result is an integer or a range that includes both numbers. Any other string is returned
+    unchanged, and refused later when the suite is planned. Raises CoarticError for a range whose
+    second number is lower than the first.
 
     Examples
     --------
@@ -101,8 +103,8 @@ def parse_run_range(text: str) -> Any:
 def split_names(texts: Sequence[str] | None) -> list[str]:
     """Split the values of an option at commas, and strip blanks.
 
-    ``texts`` contains a string for each time that the option is given, or is None if the option is
-    not given. For None the result is an empty list.
+    ``texts`` contains a string for each use of the option on the command line. It is None if the
+    option is not used; then the result is an empty list.
 
     Examples
     --------
@@ -113,10 +115,11 @@ def split_names(texts: Sequence[str] | None) -> list[str]:
 
 
 def constants_in(texts: Sequence[str]) -> dict[str, Any] | None:
-    """Parse texts such as ``motor_noise=0.01``, and return a dict that maps constants to values.
+    """Parse strings such as ``motor_noise=0.01``, and return a dict that maps names to values.
 
-    A value that is not a number is a string. The result is None if there are no texts. Raises
-    CoarticError for a text without ``=``. Names and values are checked later by the plan.
+    A value is a float or, if it is not a number, a string. The result is None if ``texts`` is
+    empty. Raises CoarticError for a string without ``=``. Names and values are checked later, when
+    the suite is planned.
 
     Examples
     --------
@@ -138,9 +141,10 @@ def constants_in(texts: Sequence[str]) -> dict[str, Any] | None:
 
 
 def method_titles(registered: Registry) -> dict[str, str]:
-    """Return a dict that maps the ids of methods to their titles in tables.
+    """Return a dict that maps the ids of built-in methods to their titles in tables.
 
-    The title of a method without a title of its own is an empty string.
+    The dict also contains the ids of methods from files. Their titles are empty strings, and so are
+    titles that are equal to the id.
     """
     from coartic.analysis.methods import title_of
 
@@ -160,18 +164,19 @@ def resolve_methods(
     registered : mapping of str to MethodInfo
         Dict that maps ids to all known methods.
     expand : bool
-        True to replace each wildcard by the ids that match it; False to return a wildcard that
-        matches more than one id unchanged.
+        True to replace each wildcard by the ids that match it. If False, a wildcard that matches
+        more than one id is returned unchanged.
 
     Returns
     -------
     list of str
-        Ids in the order of ``names``.
+        Ids in the order of ``names``. The ids that match a wildcard are in the order of
+        ``registered``.
 
     Raises
     ------
     CoarticError
-        A name is unknown.
+        A name is unknown, or is the name of something that is not a method.
     """
     from coartic.benchmarks.registry import methods_named
     from coartic.benchmarks.suites import check_kind
@@ -198,12 +203,12 @@ def resolve_methods(
 def check_used(
     method_files: Sequence[Path] | None, registered: Registry, methods: Iterable[str]
 ) -> None:
-    """Raise CoarticError if the command uses no method of a method file.
+    """Raise CoarticError if a command uses no method of one of its method files.
 
     Parameters
     ----------
     method_files : sequence of Path or None
-        Files of option ``--method-file``; None if it is not given.
+        Files of option ``--method-file``; None if the option is not used.
     registered : mapping of str to MethodInfo
         Dict that maps ids to all known methods.
     methods : iterable of str
@@ -220,8 +225,8 @@ def check_used(
 def file_name(method: str) -> str:
     """Return the default file name of ``coartic new`` for the id of a method.
 
-    The name without ``.py`` is a valid name of a Python module. It differs from the names of the
-    modules of the standard library, of coartic and of NumPy.
+    The name without ``.py`` is a valid name of a Python module, and is not ``coartic``, ``numpy``
+    or the name of a module of the standard library.
 
     Examples
     --------

@@ -1,9 +1,9 @@
 """Complete names on the command line: suites, tasks, methods, and ids of runs.
 
 When the user presses Tab, the shell starts coartic, which calls one of these functions with the
-incomplete word. The function returns a list of words. Typer offers the words that begin with the
-incomplete one; if there are none, the shell offers files. To be fast, the functions import neither
-pandas nor Numba.
+incomplete word. The function returns a list of words. Typer offers those of them that begin with
+the incomplete word; if there are none, the shell offers files. To be fast, the functions import
+neither pandas nor Numba.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def suites(incomplete: str = "") -> list[str]:
 def tasks(incomplete: str = "") -> list[str]:
     """Return the names of the shipped tasks, and of an instance of each shipped family.
 
-    The instance is ``i000``, the first of the test split.
+    The instance is ``i000``, the first test instance.
     """
     files = sorted((_PACKAGE / "tasks" / "paper").glob("*.toml"))
     return [
@@ -44,10 +44,9 @@ def families(incomplete: str = "") -> list[str]:
 
 
 def methods(incomplete: str = "") -> list[str]:
-    """Return names of the built-in methods: ids, exploration conditions and titles.
+    """Return names of the built-in methods: exploration conditions, titles and ids.
 
-    Condition ``custom`` and titles with a blank are left out. ``incomplete``, what the user has
-    typed so far, is ignored: Typer itself selects the names that begin with it.
+    The condition ``custom`` and titles with a blank are left out.
     """
     from coartic.method import built_in_methods
 
@@ -58,7 +57,7 @@ def methods(incomplete: str = "") -> list[str]:
 
 
 def names(incomplete: str = "") -> list[str]:
-    """Return the names that ``coartic list`` describes."""
+    """Return the names of the shipped suites, tasks and families, and of the built-in methods."""
     return [*suites(), *tasks(), *families(), *methods()]
 
 
@@ -78,7 +77,8 @@ def after_commas(words: Words) -> Words:
 def runs(ctx: typer.Context, incomplete: str) -> list[str]:
     """Return the ids of stored runs that begin with the incomplete word.
 
-    The runs are those of the results folder that is named on the command line.
+    The runs are all those in the results folder that is named on the command line. The result is
+    empty if no folder is named yet. Raises CoarticError if the folder cannot be read.
     """
     from coartic.runs.store import open_store
 

@@ -93,7 +93,7 @@ def report(
 def say_ranking(study: Study, folder: Path) -> None:
     """Print the ranking of each world, and the command for a report.
 
-    The name of the world is the heading of each ranking, unless the folder contains only the
+    Each ranking has the name of its world as a heading, unless the folder contains only runs in the
     paper's world. ``folder`` is the results folder of the study.
     """
     from coartic.analysis.words import capital
@@ -113,13 +113,15 @@ def _say_ranking_of_world(study: Study) -> None:
 
     The notes say
 
-    - what the study found, if it varies parameters or no method is ranked;
+    - the main finding, if the study varies parameters or no method is ranked;
     - which methods are not ranked, and why;
-    - to which rewards the gaps refer, and for which tasks no such reward is shipped;
+    - to which rewards the gaps refer, and for which tasks this reward is known only from the
+      folder, or not at all;
     - how many runs are needed for confidence intervals, if there are too few;
-    - how many runs failed, and why.
+    - how many runs failed, and why;
+    - warnings about methods (:attr:`.Study.marks`).
 
-    ``study`` is a study of one world, an entry of :attr:`.Study.worlds`.
+    ``study`` is a study of one world, a value of :attr:`.Study.worlds`.
     """
     from coartic.analysis.report.sections import SECTIONS, finding, limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
@@ -254,9 +256,10 @@ def _perform_again(
     folder : Path
         Results folder.
     count : int
-        Largest number of runs to select (:func:`.some_runs`) if ``run_ids`` is empty or None.
+        Largest number of runs to select (:func:`.some_runs`). It is used only if ``run_ids`` is
+        empty or None.
     run_ids : list of str or None
-        Beginnings of the ids of the runs to perform again.
+        Beginnings of the ids of the runs to perform again. These runs are also described.
     method_file : list of Path or None
         Files with methods of the user.
     """
@@ -296,10 +299,10 @@ def _perform_again(
 
 
 def _describe_run(run: Row, code: str) -> None:
-    """Print the id, the seed, the parameters and the result of a run.
+    """Print what a run did: its method, task, parameters, seed and result.
 
-    ``code`` is the present version of the method, or the present hash of a method from a file. If
-    another version or code made the run, a sentence says so.
+    ``code`` is the present version of the method or, for a method from a file, the present hash of
+    its code. If another version or other code made the run, this is printed, too.
     """
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
@@ -472,15 +475,15 @@ def _film(
     initial : bool
         True to show the corrective process alone beside a single run.
     width : int
-        Width of the film in pixels; for MP4 it is rounded down to an even number.
+        Width of the film in pixels. The width of an MP4 is even, and can be up to 2 pixels less.
     replace : bool
         True to replace an existing file.
 
     Raises
     ------
     CoarticError
-        There are more than two movements to show, a run is unknown or has no solution, or the film
-        cannot be written.
+        There are more than two movements to show, a run is unknown or has no solution, the
+        corrective process does not complete the task, or the film cannot be written.
     """
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of

@@ -261,7 +261,7 @@ def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
 
 
 def _list_runs(folder: Path) -> None:
-    """Print a line for each run of a results folder, with its id."""
+    """Print a table of the stored runs in the plan of a results folder."""
     from coartic.runs.store import open_store
 
     with open_store(folder) as store:
@@ -362,8 +362,8 @@ def check(
 def _show_results(name: str, results: Sequence[CheckResult]) -> int:
     """Print the results of checks, and return the number of checks that did not pass.
 
-    ``name`` is the name of the method or file that was checked. A check that was not made is
-    counted as a check that did not pass.
+    ``name`` is the name of the method or file that was checked. A check that was not made counts as
+    a check that did not pass.
     """
     words = {True: "pass", False: "FAIL", None: "skip"}
     for result in results:

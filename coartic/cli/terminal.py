@@ -25,10 +25,10 @@ _ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\xa0": " "}
 
 
 def _replaced(error: UnicodeError) -> tuple[str, int]:
-    """Replace characters that cannot be encoded for a terminal by ASCII characters.
+    """Replace characters that an encoding does not have by ASCII characters.
 
-    This is an error handler for module ``codecs``. A character without a counterpart in
-    :data:`_ASCII` becomes ``?``. Return the replacement, and the index at which encoding continues.
+    This is an error handler for module ``codecs``. It returns the replacement, and the index at
+    which encoding continues. A character that is not in :data:`_ASCII` becomes ``?``.
     """
     if not isinstance(error, UnicodeEncodeError):
         raise error
@@ -40,26 +40,26 @@ codecs.register_error("replaced", _replaced)
 
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
-    """Print lines, after replacing characters that are not printable.
+    """Print lines, in which characters that are not printable are replaced (:func:`.one_line`).
 
-    Such characters are, for example, line breaks in names (:func:`.one_line`).
+    For example, a line break in a name is replaced.
 
     Parameters
     ----------
     *lines : str
         The lines.
     stream : file, optional
-        Stream to print on, by default standard output. If a stream other than standard output
-        cannot be written, the lines are lost, and no error is raised.
+        Stream to print on, by default standard output. If another stream cannot be written, for
+        example because a disk is full, the lines are lost, and no error is raised.
     end : str
         String to print after the last line.
 
     Raises
     ------
     CoarticError
-        Standard output cannot be written.
+        Standard output cannot be written, for example because a disk is full.
     BrokenPipeError
-        The program that reads the stream has ended.
+        The program that reads the stream, such as ``head``, has ended.
     """
     stream = stream or sys.stdout
     text = "\n".join(map(one_line, lines)).replace("\u202f", " ")
@@ -77,9 +77,10 @@ def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
 
 
 def complain(kind: str, text: str) -> None:
-    """Print each line of an error message or a warning on standard error.
+    """Print an error message or a warning on standard error.
 
-    Each line begins with ``kind`` and a colon. On a terminal, long lines are wrapped.
+    ``kind`` and a colon are printed before each line of ``text``. On a terminal, long lines are
+    wrapped.
 
     Parameters
     ----------
@@ -94,11 +95,11 @@ def complain(kind: str, text: str) -> None:
 
 
 def _wrap(text: str, width: int) -> list[str]:
-    """Wrap a text at spaces, and return its lines of at most ``width`` characters.
+    """Wrap a text at spaces, and return its lines.
 
-    Commands are not wrapped, so that users can copy them. A command is a text in backticks, or a
-    whole text that begins with ``coartic``. A line with a command can therefore be longer than
-    ``width``. A number and its % sign stay on one line, too.
+    A line has at most ``width`` characters, unless it contains a longer word or command. Commands
+    are not wrapped, so that users can copy them. A command is a part of the text in backticks, or
+    the whole text if it begins with ``coartic``. A number and its % sign stay on one line, too.
     """
     fixed = re.sub("`[^`]*`|^coartic .*", lambda found: found[0].replace(" ", "\xa0"), text)
     wrapped = textwrap.wrap(
@@ -110,8 +111,7 @@ def _wrap(text: str, width: int) -> list[str]:
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
     """Print pairs of a word and a sentence in two columns.
 
-    The second column is wrapped to the width of the terminal; commands in it are not
-    (:func:`_wrap`).
+    The second column is wrapped to the width of the terminal (:func:`_wrap`).
     """
     rows = list(pairs)
     indent = max((len(word) for word, _ in rows), default=0) + 2
@@ -124,8 +124,8 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
 def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table with headings.
 
-    The first column is aligned to the left, and wrapped on a narrow terminal. All other columns are
-    aligned to the right. If there are no rows, nothing is printed.
+    The first column is left-aligned, and wrapped on a narrow terminal. All other columns are
+    right-aligned. If there are no rows, nothing is printed.
     """
     if not rows:
         return
@@ -141,8 +141,8 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 class Display:
     """Context manager that shows on standard error what a command is doing.
 
-    On a terminal, one line is shown and updated. Elsewhere, for example in a file, progress is
-    printed at most every ten seconds, and once more at the end.
+    On a terminal, one line is shown and updated. Elsewhere, for example in a file, a line is
+    printed at most every ten seconds, and once more at the end of the runs.
     """
 
     EVERY_S = 10.0
@@ -165,13 +165,13 @@ class Display:
     def show(self, doing: str) -> None:
         """Show what the command is doing now.
 
-        If standard error is not a terminal, the line is printed only if the last line was printed
-        at least ten seconds ago.
+        If standard error is not a terminal, ``doing`` is printed only if at least ten seconds have
+        passed since the display was made and since the last such line.
         """
         self._show(lambda: doing)
 
     def line(self, *texts: str) -> None:
-        """Print lines that stay; on a terminal they stand above the line that is updated."""
+        """Print lines on standard error; on a terminal, above the line that is updated."""
         for text in texts:
             say(text, stream=sys.stderr)
 
@@ -182,10 +182,11 @@ class Display:
             self.line(doing())
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
-        """Show the progress of runs, as argument ``watch`` of :func:`coartic.benchmarks.perform`.
+        """Show the progress of runs.
 
-        Before the first run, when ``cell`` is None, this function prints how many runs are stored
-        in the folder already. If all runs of the plan are stored, no progress is shown.
+        The function is passed as argument ``watch`` to :func:`coartic.benchmarks.perform`. Before
+        the first run, when ``cell`` is None, it prints which runs are stored in the folder already,
+        and warnings about them. If all runs of the plan were stored before, no progress is shown.
         """
         if cell is None:
             self._say_present(progress)
@@ -253,9 +254,9 @@ def _progress_bar(doing: Callable[[], str]) -> Any:
 
 
 def _time_left(seconds: float) -> str:
-    """Return a phrase for a time that is left, such as ``about 40 s left``.
+    """Return a phrase for the time that is left, such as ``about 40 s left``.
 
-    The time is in s. For NaN and 0 the phrase is empty.
+    ``seconds`` is the time in s. The phrase is empty for NaN, and for times that are not above 0.
     """
     if not seconds > 0:  # True for NaN
         return ""

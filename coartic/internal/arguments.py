@@ -17,8 +17,8 @@ from coartic.internal.validation import explain
 Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
 Numbers = Annotated[ArrayLike, PlainValidator(real_numbers)]
-"""Type hint for an array of real numbers of any shape, or for lists of numbers. A checked function
-(:func:`checked_arguments`) gets an array of float64."""
+"""Type hint for an argument that is an array of real numbers of any shape, or a list of numbers.
+The decorator :func:`checked_arguments` converts the argument to an array of float64."""
 _STRICT = ConfigDict(strict=True, arbitrary_types_allowed=True)
 
 
@@ -27,7 +27,7 @@ class ArgumentError(CoarticError, ValueError, TypeError):
 
 
 def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Computed]:
-    """Decorate a function, so that its arguments are checked against its type hints.
+    """Decorate a function so that its arguments are checked against its type hints.
 
     The decorated function raises ArgumentError if an argument does not match its type hint, is
     missing or is unknown. NumPy scalars are accepted where Python numbers are. Strings, True and

@@ -1,4 +1,4 @@
-"""Write files and folders of files, so that an interruption leaves no incomplete file."""
+"""Write files and folders of files so that an interruption leaves no incomplete file."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from coartic.internal.text import plain, prints
 
 _PART = ".coartic-"  # beginning of the name of a file that is being written
 LISTING = ".coartic-files"
-"""Name of a file in a folder. It lists the files that coartic has written into this folder, one on
-each line, and the files that an interrupted command was about to write."""
+"""Name of a hidden file in a folder into which coartic writes. Each line of the file is the path of
+a file that coartic has written into this folder, or that an interrupted command was about to
+write."""
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -34,22 +35,23 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files into a folder, and remove files of an earlier call that are not in ``files``.
+    """Write files into a folder, in place of the files of earlier calls.
 
-    Files that coartic did not write are never changed.
+    Files of earlier calls that are not in ``files`` are removed, and so are subfolders that become
+    empty. Files that coartic did not write are never changed.
 
     Parameters
     ----------
     folder : Path
         Folder to write into. A missing folder is made.
     files : mapping of str to bytes
-        Dict that maps the path of each file in the folder to its content.
+        Dict that maps the path of each file, relative to the folder, to its content.
 
     Raises
     ------
     CoarticError
-        Writing fails, or the folder cannot be used (:func:`make_folder`). If the folder cannot be
-        used, no file is written.
+        The folder cannot be used (:func:`make_folder`), so that no file is written, or writing a
+        file fails.
     """
     old_files = make_folder(folder, files)
 
@@ -83,8 +85,8 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
     Returns
     -------
     set of str
-        Paths of the files that coartic has written into the folder (:data:`LISTING`), relative to
-        the folder.
+        Paths of the files that :data:`LISTING` lists, relative to the folder; empty if the folder
+        has no such file, or a damaged one.
 
     Raises
     ------
@@ -92,8 +94,9 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
         One of these is the case:
 
         - the folder cannot be made or written;
-        - one of the files to be written exists, and coartic has not listed it in :data:`LISTING`;
-        - a path leads out of the folder, or is a symbolic link.
+        - one of the files to be written exists, and :data:`LISTING` does not list it;
+        - the path of a listed file or of a file to be written leads out of the folder, or is a
+          symbolic link.
     """
     listing = folder / LISTING
     with describe_os_errors(folder):
@@ -117,7 +120,7 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
 def check_inside(folder: Path, path: Path) -> None:
     """Raise CoarticError if a path leads out of a folder, or is a symbolic link.
 
-    There need not be a file at ``path``.
+    The file at ``path`` need not exist.
     """
     home, real_paths = os.path.realpath(folder), map(os.path.realpath, (path, path.parent))
     if path.is_symlink() or not all(Path(real).is_relative_to(home) for real in real_paths):
@@ -138,7 +141,8 @@ def write_output(path: Path, data: bytes, *, replace: bool) -> None:
 def check_ending(path: Path, endings: Collection[str]) -> None:
     """Raise CoarticError if the suffix of a path is not one of ``endings``.
 
-    Upper and lower case of the suffix are treated as equal; ``endings`` are in lower case.
+    Upper and lower case of the suffix are treated as equal. ``endings`` are in lower case, such as
+    ``".svg"``.
     """
     if path.suffix.lower() not in endings:
         *others, last = endings
@@ -147,7 +151,7 @@ def check_ending(path: Path, endings: Collection[str]) -> None:
 
 
 def check_output(path: Path, *, replace: bool) -> None:
-    """Raise CoarticError if a file must not be written to a path.
+    """Raise CoarticError if a file cannot or must not be written to a path.
 
     This is the case if the folder of the file does not exist, or if the file exists and ``replace``
     is False.
@@ -163,10 +167,10 @@ def check_output(path: Path, *, replace: bool) -> None:
 
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
-    """Convert the name of a file or folder, which need not exist, to a path.
+    """Convert the name of a file or folder to a path.
 
-    Raises CoarticError if the name is empty or blank. The error message begins with ``what``, which
-    says what the name stands for.
+    The file or folder need not exist. Raises CoarticError if the name is empty or blank. The error
+    message begins with ``what``, a phrase such as ``"the name of a folder"``.
     """
     if not str(name).strip():
         raise CoarticError(f"{what} is empty; for the current folder write a dot")

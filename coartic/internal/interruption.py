@@ -1,7 +1,8 @@
 """End an interrupted command with a short message, and exit code 130 or 143.
 
-The signals of Ctrl-C (SIGINT), SIGTERM and SIGHUP raise KeyboardInterrupt, so that ``with`` blocks
-can end worker processes and remove temporary folders before the command ends.
+After :func:`catch_signals`, the signals SIGINT (Ctrl-C), SIGTERM and SIGHUP raise
+KeyboardInterrupt, so that ``with`` blocks can end worker processes and remove temporary folders
+before the command ends.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ _message = ["Interrupted."]
 
 
 def catch_signals() -> None:
-    """Make Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt, and unblock all signals.
+    """Make SIGINT (Ctrl-C), SIGTERM and SIGHUP raise KeyboardInterrupt, and unblock all signals.
 
-    For 5 s after such a signal, further signals are ignored. Signals that the process ignores
-    already, as under ``nohup``, are still ignored.
+    For 5 s after one of the three signals has raised KeyboardInterrupt, further ones are ignored. A
+    signal that the process ignores already, such as SIGHUP under ``nohup``, is still ignored.
     """
 
     def interrupt(number: int, _: object) -> None:
@@ -39,10 +40,10 @@ def catch_signals() -> None:
 
 
 def raise_if_interrupted() -> None:
-    """Raise KeyboardInterrupt again if a signal raised it before and the program still runs.
+    """Raise KeyboardInterrupt if a signal has raised it before.
 
-    Python drops an exception that a signal handler raises inside a finaliser or a callback of a
-    library.
+    The program may still run after the signal, because Python drops an exception that a signal
+    handler raises inside a finaliser or a callback of a library.
     """
     if _received:
         raise KeyboardInterrupt
@@ -52,8 +53,8 @@ def raise_if_interrupted() -> None:
 def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
     """Add a sentence to the final message if a ``with`` block is interrupted.
 
-    If the block raises KeyboardInterrupt, the function ``sentence`` is called for the sentence, and
-    the error is raised again. :func:`end_if_interrupted` prints the message.
+    If the block raises KeyboardInterrupt, the function ``sentence`` is called, which returns the
+    sentence, and the error is raised again. :func:`end_if_interrupted` prints the final message.
     """
     try:
         yield
@@ -65,7 +66,7 @@ def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
 def end_if_interrupted() -> None:
     """Exit with a message on standard error if a signal has interrupted this process.
 
-    The exit code is 130 if the first signal was that of Ctrl-C, and otherwise 143. If there was no
+    The exit code is 130 if the first signal was SIGINT (Ctrl-C), and otherwise 143. If there was no
     signal, the function returns. In both cases the process ignores the signals :data:`ENDING` from
     then on.
     """

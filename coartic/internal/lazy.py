@@ -21,7 +21,7 @@ def import_lazily(
     package : str
         Name of the package, which is being imported.
     homes : mapping of str to str
-        Dict that maps each public name of the package to the module that defines this name.
+        Dict that maps each public name of the package to the module from which it is imported.
 
     Returns
     -------
@@ -29,7 +29,8 @@ def import_lazily(
         Function ``__getattr__``. It imports the module of a name, and returns the object with this
         name. It raises AttributeError for a name that is not in ``homes``.
     callable
-        Function ``__dir__``, which lists the names.
+        Function ``__dir__``. It returns a sorted list of the names in ``homes``, and of those names
+        of the package that end with two underscores.
     """
     module = sys.modules[package]
 

@@ -19,7 +19,8 @@ MAX_RUNS = 1_000_000
 MAX_TRIALS = 10_000_000
 """Largest number of trials of a run. The rewards of all trials are stored."""
 MAX_SECONDS = 1_000_000
-"""Largest time limit (in s). Operating systems can wait for about twice this time."""
+"""Largest time limit (in s). The longest wait that operating systems allow is about twice this
+time."""
 MAX_SEED = 2**63 - 1
 """Largest seed of a suite."""
 MAX_RUN_SEED = 2**128 - 1
@@ -48,10 +49,10 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
 
 
 def plain_values(value: Any) -> Any:
-    """Convert NumPy scalars to Python numbers, also inside lists, tuples and dicts.
+    """Convert NumPy scalars to Python objects, also inside lists, tuples and dicts.
 
     Lists, tuples and dicts are copied, at any depth. Keys of dicts, and objects of subclasses of
-    these types, are not converted.
+    ``list``, ``tuple`` and ``dict``, are not converted.
 
     Examples
     --------
@@ -84,9 +85,10 @@ def real_array(name: str, value: Any) -> NDArray[np.float64]:
 def real_numbers(value: Any) -> NDArray[np.float64]:
     """Convert real numbers to an array of float64 of the same shape.
 
-    An ``ndarray`` of float64 is returned without a copy. NaN and infinity are allowed. Raises
-    ValueError for anything else, such as strings, complex numbers, True and False, rows of unequal
-    length, masked entries, or integers that are too large for float64.
+    ``value`` is a number, an array, or a list of numbers or of lists. An ``ndarray`` of float64 is
+    returned without a copy. NaN and infinity are allowed. Raises ValueError for strings, complex
+    numbers, True and False, rows of unequal length, masked entries, integers that are too large for
+    float64, and any other objects that are not real numbers.
     """
     import numpy as np  # slow to import, and the help of commands does not need it
 

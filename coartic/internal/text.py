@@ -26,7 +26,7 @@ _MAX_NAMED = 12  # largest number of names in a sentence
 def plain(text: str, most: int = MAX_REASON_LENGTH) -> str:
     """Convert a string to one printable line (:func:`one_line`) of limited length.
 
-    Blanks at both ends are removed. A line with more than ``most`` characters is cut to this
+    White space at both ends is removed. A line with more than ``most`` characters is cut to this
     length, and ends in ``…``.
 
     Examples
@@ -80,11 +80,10 @@ def pluralize(count: int, thing: str) -> str:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return a hint with the known name that is most similar to a misspelt one.
+    """Return a hint such as ``; did you mean 'a'?`` for a misspelt name.
 
-    The hint, such as ``; did you mean 'a'?``, contains the entry of ``names`` that is most similar
-    to ``name``; upper and lower case are treated as equal. The hint is empty if no entry is
-    similar.
+    The hint contains the entry of ``names`` that is most similar to ``name``, where upper and lower
+    case are treated as equal. The hint is empty if no entry is similar.
     """
     by_lower_case = {known.lower(): known for known in names}
     nearest = difflib.get_close_matches(name.lower(), by_lower_case, 1)
@@ -92,7 +91,7 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
 
 
 BACKWARDS = "{!r} goes backwards; put the lower number first"
-"""Error message for a range, such as ``50..9``."""
+"""Template of the error message for a range whose ends are swapped, such as ``50..9``."""
 FOREIGN = (
     *(".urdf", ".xml", ".osim", ".mot", ".sto", ".trc"),
     *(".c3d", ".mat", ".xlsx", ".xls", ".ods"),
@@ -101,10 +100,10 @@ FOREIGN = (
 
 
 def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto/task.md") -> str:
-    """Return an error message if a file is in the format of another program.
+    """Return an error message if the name of a file has a suffix in :data:`FOREIGN`.
 
-    The format is recognised by the suffix of the name (:data:`FOREIGN`). The message ends with
-    ``wanted``, which says what coartic reads instead. For any other file the message is empty.
+    The message ends with ``wanted``, which says what coartic reads instead. For any other name the
+    message is empty.
     """
     if not path.lower().endswith(FOREIGN):
         return ""
@@ -127,9 +126,9 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     Returns
     -------
     str
-        The message suggests the known name that is most similar. If no known name is similar, the
-        message lists the first 12 known names. If ``name`` is the name of a file of another
-        program, such as ``arm.urdf``, the message is that of :func:`foreign_file`.
+        If ``name`` is the name of a file of another program, such as ``arm.urdf``, the message is
+        that of :func:`foreign_file`. Otherwise the message suggests the most similar known name, or
+        lists the first 12 known names if no known name is similar.
 
     Examples
     --------
@@ -146,7 +145,7 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
 
 
 def _refuse_unprintable(text: str) -> str:
-    """Return a string unchanged, or raise a validation error if it is not printable."""
+    """Return a string unchanged; raise a validation error if a character is not printable."""
     if wrong := next((c for c in text if not prints(c)), ""):
         message = f"should be one printable line, without {escape(wrong)}"
         raise PydanticCustomError("not_plain", "{words}", {"words": message})
@@ -154,6 +153,8 @@ def _refuse_unprintable(text: str) -> str:
 
 
 printable = AfterValidator(_refuse_unprintable)
-"""Validator of pydantic that refuses a string unless it is one printable line."""
+"""Validator of pydantic that refuses a string with a character that is not printable, such as a
+line break."""
 Line = Annotated[str, Field(max_length=MAX_LINE_LENGTH), printable]
-"""Printable line, such as a title, of at most :data:`MAX_LINE_LENGTH` characters."""
+"""Type of a string, such as a title, that is one printable line of at most :data:`MAX_LINE_LENGTH`
+characters. It may be empty."""

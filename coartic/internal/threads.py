@@ -24,17 +24,18 @@ MAX_JOBS = 10_000
 _POOLS = "OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "NUMBA_NUM", "VECLIB_MAXIMUM"
 _environment_lock = threading.RLock()
 ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
-"""Environment variables that limit numerical libraries to one thread in each worker, because the
-threads of several workers would compete for the cores."""
+"""Dict that maps environment variables to values that limit numerical libraries to one thread in
+each worker. More threads of several workers would compete for the cores."""
 
 
 @cache
 def worker_variables() -> dict[str, str]:
-    """Return the environment variables of worker processes, in which methods run.
+    """Return a dict of the environment variables of worker processes, in which methods run.
 
     The variables limit numerical libraries to one thread. On x86-64 they also select OpenBLAS's
-    kernels for Nehalem and NumPy's loops without AVX-512, so that all processors with AVX2 (from
-    Haswell and Zen on) round alike. Each call returns the same dict: do not change it.
+    kernels for Nehalem and NumPy's loops without AVX-512, so that floating-point results are the
+    same on all processors with AVX2 (from Haswell and Zen on). Each call returns the same dict: do
+    not change it.
     """
     if platform.machine() not in ("x86_64", "AMD64"):
         return ONE_THREAD
@@ -64,9 +65,10 @@ def threads_for(jobs: int) -> int:
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
     """Call a function with slices of a range of indices, in parallel threads.
 
-    The slices cover ``range(count)``. The number of slices is at most the environment variable
-    ``OMP_NUM_THREADS`` or, if that is not set to a number, the number of cores that the process may
-    use. The function returns when all calls have ended. An error of a call is raised.
+    The slices cover ``range(count)``. The number of slices is at most the value of the environment
+    variable ``OMP_NUM_THREADS``. If that is not a number, it is at most the number of cores that
+    the process may use. The function returns when all calls have ended. If a call raises an error,
+    the error is raised.
 
     Parameters
     ----------
@@ -93,7 +95,7 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
     """Set environment variables for the processes that are started in a ``with`` block.
 
     At the end of the block, the earlier values of the variables are restored. If several threads
-    call this function, one block is executed after the other.
+    use this context manager, their blocks are executed one after the other.
     """
     with _environment_lock:
         old_values = {name: os.environ[name] for name in variables if name in os.environ}
@@ -109,16 +111,16 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
     """Make this process a worker: the leader of a new process group.
 
-    If the process gets SIGTERM, or its parent ends, the process and all processes of the group are
-    killed.
+    If the process gets SIGTERM, exits, or loses its parent, the process and all processes of the
+    group are killed.
 
     Parameters
     ----------
     folder : Path, optional
         Folder that is removed when the parent ends.
     streams : int
-        Number of standard streams that are connected to the null device: 1 for input, 2 for input
-        and output, 3 for input, output and errors.
+        Number of standard streams that are connected to the null device: 1 for standard input, 2
+        for standard input and output, 3 for standard input, output and error.
     """
     null_device = os.open(os.devnull, os.O_RDWR)
     for stream in range(streams):
@@ -136,9 +138,9 @@ def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
 def _let_forks_end() -> None:
     """Let SIGTERM end the processes that this process forks.
 
-    Such processes are, for example, those of a pool that a method makes. They inherit the signal
-    handler of the worker. So SIGTERM is blocked until a forked process has set the default handler;
-    otherwise a signal that arrives before that would not end the process.
+    For example, a method can make a pool of processes. A forked process inherits the signal handler
+    of the worker, and then sets the default handler. SIGTERM is blocked until then, so that the
+    inherited handler never handles a signal in the forked process.
     """
 
     def mask(how: int) -> None:
@@ -167,7 +169,7 @@ def end_with_parent(
     folder : Path, optional
         Folder that the thread removes before it ends the process.
     end : callable
-        Function without arguments that ends the process.
+        Function without arguments that ends the process, by default with exit code 1.
     """
 
     def wait() -> None:

@@ -24,9 +24,9 @@ def _library_folders() -> tuple[Path, ...]:
 
 
 def is_users(module: str, path: Path) -> bool:
-    """Return whether a module is the user's, and was loaded from a file.
+    """Return whether a module belongs to the user and was loaded from a file.
 
-    A module is the user's if it belongs neither to coartic, nor to the standard library, nor to an
+    A module belongs to the user if it is not a part of coartic, of the standard library or of an
     installed package.
 
     Parameters
@@ -48,12 +48,11 @@ def import_from(folder: Path) -> None:
     """Prepare this process to import modules from a folder with files of the user.
 
     - *Search path.* The folder becomes the first entry of ``sys.path``, like the folder of a
-      program. If coartic runs in a checkout, the root of the checkout becomes the last entry,
+      program. If the root of a checkout of coartic is in ``sys.path``, it becomes the last entry,
       because its subfolders have common names, such as ``analysis`` and ``tests``.
-    - *Bytecode.* Modules of the user are compiled from their source, and no bytecode of them is
-      stored. Python would use stored bytecode if the size and the time stamp of the source are
-      unchanged. But the size and the time stamp can also be unchanged if a changed file comes from
-      an archive, or is a copy that keeps the time stamp.
+    - *Bytecode.* From then on, modules of the user are compiled from their source, and their
+      bytecode is not stored. Python itself would use stored bytecode if the size and the time stamp
+      of the source have not changed, and a changed file from an archive can have both unchanged.
     """
     sys.path.insert(0, str(folder))
     root = Path(coartic.__file__).parents[1]

@@ -1,4 +1,4 @@
-"""Validate data from files and calls by pydantic, with error messages of one sentence."""
+"""Validate data of files and arguments by pydantic, with error messages of one sentence."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ _UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
 
 def describe_validation_errors(kind: type[T]) -> type[T]:
-    """Decorate a class of pydantic, so that a call with invalid data raises ValueError.
+    """Decorate a class of pydantic so that its constructor raises ValueError for invalid data.
 
-    The message of the ValueError is the sentence of :func:`explain`, after the name of the class.
-    Without the decorator, pydantic raises ValidationError, with a message of many lines. The method
+    The message of the ValueError is the name of the class and the sentence of :func:`explain`.
+    Without the decorator, pydantic raises ValidationError, with a message of many lines. The
+    decorated constructor also accepts NumPy scalars where Python numbers are required. The method
     ``model_validate`` is not changed.
     """
     init: Any = kind.__init__
@@ -40,10 +41,11 @@ def describe_validation_errors(kind: type[T]) -> type[T]:
 
 
 def equal_contents(a: Any, b: Any) -> Any:
-    """Compare two objects field by field, as ``__eq__`` of classes with arrays.
+    """Compare two objects field by field; classes with arrays use this function as ``__eq__``.
 
     Two arrays are equal if their shapes and entries are equal. NaN is treated as equal to NaN and
-    to a masked entry. The result is NotImplemented if the objects have different classes.
+    to a masked entry. Fields of a dataclass with ``compare=False`` are ignored. The result is
+    NotImplemented if the objects have different classes.
     """
     import numpy as np
 
@@ -72,20 +74,21 @@ class FileData(BaseModel):
 
 
 def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool = False) -> str:
-    """Return a sentence on one problem of a validation error, with its key and value.
+    """Return a sentence that describes one problem of a validation error.
 
-    The problem is the first unknown key. If there is no unknown key, it is the first problem.
+    The sentence describes the first unknown key or, if there is none, the first problem. It names
+    the key and, if the value is wrong, the value.
 
     Parameters
     ----------
     error : ValidationError
         Error of a class of pydantic or of a checked function.
     keys : iterable of str
-        Known keys or, for a function, the names of its arguments in their order. For an unknown
+        Known keys or, for a function, the names of its parameters in their order. For an unknown
         key, the sentence suggests the most similar known key.
     of_call : bool
-        True if the error is that of a call of a function. Strings in the location of a problem
-        inside an argument are then names of types, not keys, and are left out.
+        True if the error was raised by the call of a checked function. If a problem is inside an
+        argument, pydantic then reports names of types instead of keys, which are left out.
 
     Returns
     -------

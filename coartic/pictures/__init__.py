@@ -1,4 +1,4 @@
 """Pictures of the robot, trajectories tick by tick, and films of movements.
 
-Modules here know executed solutions, but not which method found them.
+The modules do not use the methods that found the solutions.
 """

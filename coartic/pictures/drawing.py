@@ -36,9 +36,9 @@ def draw_robot(
     alpha: float = 1.0,
     colour: str = _BLACK,
 ) -> Callable[[Array], None]:
-    """Draw the base and the arms of the task's hands in a configuration.
+    """Draw the base, and the arms whose hands the task uses, in a configuration.
 
-    The caller sets the limits of ``axes``, because the base does not widen them.
+    The caller sets the limits of ``axes``, because drawing the base does not widen them.
 
     Parameters
     ----------
@@ -51,12 +51,12 @@ def draw_robot(
     alpha : float
         Opacity, from 0 to 1.
     colour : str
-        Colour of the lines.
+        Colour of the lines. The base is filled with grey.
 
     Returns
     -------
     callable
-        A function that moves the drawing to another configuration.
+        A function that moves the drawing to the configuration that is passed to it.
     """
     base = Polygon(
         task.robot.base_outline(q),
@@ -98,7 +98,7 @@ def circle_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]
 
 
 def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
-    """Fill the circles of goals that are hit, and empty all others.
+    """Fill the circles of goals that are hit, and clear all other circles.
 
     ``hit`` contains a bool for each circle.
     """
@@ -109,9 +109,9 @@ def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
 def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) -> None:
     """Write the number of each goal (from 1) above the goal.
 
-    The number is below the goal if another goal is close above. ``weight`` is a factor for the
-    distance between number and goal. ``text`` are further options of ``Axes.annotate``, such as
-    ``fontsize``.
+    The number is below the goal if another goal is close above it. ``weight`` is a factor for the
+    distance between the number and the circle of the goal. ``text`` are further options of
+    ``Axes.annotate``, such as ``fontsize``.
     """
     goals = task.goal_array
     right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)
@@ -129,16 +129,18 @@ def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) ->
 
 
 def box(task: Task, configurations: ArrayLike, margin: float = 0.45) -> tuple[Array, Array]:
-    """Return the corners of a box around goals, base and arms.
+    """Return the corners of a box around the goals, the base and the arms.
 
     Parameters
     ----------
     task : Task
     configurations : array_like, shape (..., dof)
-        Configurations of the base and of the arms of the task's hands.
+        Configurations of the robot, in length units and rad. Only the arms whose hands the task
+        uses count.
     margin : float
-        Width of the free border for arms of length 4 (in length units). The width scales with the
-        shorter arm. Circles of goals may extend into the border.
+        Width of the free border (in length units) if the shorter arm has length 4, as the paper's
+        arms have. For other arms the width is proportional to the length of the shorter arm.
+        Circles of goals may extend into the border.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Films of movements (GIF or MP4) in the colours of the play page.
+"""Films of movements (GIF or MP4) in the colours of the page of ``coartic play``.
 
 Open squares mark the left arm, closed circles the right arm. Goals are numbered circles. A goal is
 filled from the tick at which it is hit, and the film pauses at this tick. Pale lines trace the
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
     from coartic.pictures.trajectories import Trajectory
 
 RATE = 12.5
-"""Frames per second. GIF needs an integer number of hundredths of a second for a frame."""
+"""Frames per second. In a GIF, a frame must last an integer number of hundredths of a second."""
 MAX_FRAMES = 125
-"""Largest number of frames of a film, without pauses. In longer movements each frame stands for
-several ticks."""
+"""Largest number of equally spaced frames of a film. A film of more ticks does not show each tick,
+but it always shows the ticks at which goals are hit, and the last tick, in further frames."""
 PAUSE, HOLD = 6, 30
-"""Number of frames for which the film stops when a goal is hit, and at the end."""
+"""Number of frames for which a film stands still when a goal is hit, and at the end."""
 COLOURS = "#0072b2", "#c04a00"
 _DPI = 100
 _WEIGHT = 2.0  # of lines
@@ -52,24 +52,27 @@ def write_film(
     Parameters
     ----------
     movements : sequence of (str, Trajectory)
-        Titles and movements. A movement that ends before the longest one stands still afterwards.
+        Titles and movements, at least one. A movement that ends earlier than the longest one stands
+        still afterwards.
     path : pathlib.Path
         The file, ``.gif`` or, if ffmpeg is installed, ``.mp4``.
     width : int
-        Width in pixels.
+        Width in pixels. The width of an MP4 is even, and can be up to 2 pixels less.
     replace : bool
         True to overwrite an existing file.
 
     Returns
     -------
-    (int, float)
-        The number of frames without pauses, and the number of ticks in a second.
+    int
+        Number of frames, without the repeated frames of pauses.
+    float
+        Number of ticks that the film shows in a second, outside pauses.
 
     Raises
     ------
     CoarticError
-        A movement has no tick, the file has another suffix, ffmpeg is missing, or the file exists
-        or cannot be written.
+        A movement has no tick, the file has another suffix, ffmpeg is missing or fails, the file
+        exists and ``replace`` is False, or the file cannot be written.
     """
     check_ending(path, [".gif", ".mp4"])
     is_mp4 = path.suffix.lower() == ".mp4"
@@ -109,8 +112,9 @@ def stage(
 ) -> tuple[Figure, Callable[[int], list[Any]]]:
     """Return a figure with a panel for each movement, and a function that updates it.
 
-    The figure is ``width`` pixels wide, and all panels show the same region. The function shows a
-    row, from 0, of the movements' configurations.
+    The figure is ``width`` pixels wide, and all panels show the same region. The argument of the
+    function is the index of a row of the movements' configurations, which the function shows in
+    each panel.
     """
     corners = np.array([box(movement.task, movement.configurations) for _, movement in movements])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
@@ -144,8 +148,8 @@ def stage(
 def _scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
     """Draw the goals, the robot, the paths of the hands and a counter of ticks.
 
-    Return a function that shows a given row, from 0, of the configurations of the movement. For a
-    row past the end it shows the last configuration.
+    Return a function whose argument is the index of a row of the movement's configurations. The
+    function shows this row, or the last row if the index is past the end.
     """
     task = movement.task
     paths = {hand: movement.hand_path(hand) for hand in task.hands}

@@ -1,4 +1,4 @@
-"""Solutions tick by tick: the movements that :func:`coartic.execute` scores."""
+"""Trajectories: the configuration of the robot at each control tick of a solution."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Every control tick of an execution that hits all goals (:func:`trajectory`)."""
+    """Configurations at all ticks of an execution that hits all goals (:func:`trajectory`)."""
 
     task: Task
     """The task."""
@@ -37,21 +37,23 @@ class Trajectory:
     """Execution of the solution (:func:`coartic.execute`)."""
     configurations: Array
     """Configurations, shape ``(ticks, dof)``, in length units (base) and rad (joints): a row for
-    each control tick. The first row is the start. A movement of k steps has k + 1 rows, so that its
-    last row is repeated as the first row of the next movement."""
+    each control tick. The first row is the start. A movement of k steps takes k + 1 ticks: its
+    first row is the configuration in which it begins, which is also the last row of the movement
+    before."""
     hits: NDArray[np.int64]
-    """Row in which each goal was hit, shape ``(G,)``. If a goal was hit without any ticks, this is
-    the row in which the robot stood; 0 before the first tick."""
+    """Index of the row in which each goal was hit, shape ``(G,)``. If a goal was hit without a
+    tick, it is the index of the last row of the movement before, or 0 if there was no tick
+    before."""
     __eq__ = equal_contents
 
     @property
     def hands(self) -> tuple[Hand, ...]:
-        """Name of the hand for each goal, such as ``("right", "left")``."""
+        """Hand that hits each goal, such as ``("right", "left")``."""
         return hands_of(self.execution.hands)
 
     @property
     def ticks(self) -> int:
-        """Number of control ticks, the rows of ``configurations``."""
+        """Number of control ticks, which is the number of rows of ``configurations``."""
         return self.execution.ticks
 
     @property
@@ -62,18 +64,30 @@ class Trajectory:
     def hand_path(self, hand: Hand) -> Array:
         """Return the position of a hand in each row of ``configurations``.
 
-        The shape is ``(rows, 2)``, in length units. The hand need not be one that may hit goals of
-        the task.
+        The result has shape ``(ticks, 2)``, in length units. ``hand`` may also be a hand that the
+        task does not use.
         """
         return self.task.robot.forward_kinematics(self.configurations, hand)
 
     def subtask(self, goal: int) -> Array:
         """Return the rows of ``configurations`` that belong to a goal.
 
-        The rows, shape ``(rows, dof)``, go from the hit of the goal before (or from the start) to
-        the hit of this goal, both included, so that a goal that is hit without a tick has one row.
-        There are no rows if the whole solution makes no tick. ``goal`` is the number of the goal,
-        from 1. Raises ValueError if the task does not have the goal.
+        Parameters
+        ----------
+        goal : int
+            Number of the goal, from 1.
+
+        Returns
+        -------
+        ndarray, shape (rows, dof)
+            The rows from the hit of the goal before (for goal 1, from the start) to the hit of this
+            goal, including both. A goal that is hit without a tick has one row. There are no rows
+            if the whole solution takes no ticks.
+
+        Raises
+        ------
+        ValueError
+            The task does not have the goal.
         """
         check_limits("goal", goal, 1, len(self.hits))
         start = self.hits[goal - 2] if goal > 1 else 0
@@ -85,7 +99,7 @@ class Trajectory:
         The index is ``tick``, from 0. The columns are
 
         - ``goal``: number of the first goal that is hit in this or a later row;
-        - ``hand``: the hand that is to hit this goal;
+        - ``hand``: the hand that hits this goal;
         - ``base_x`` and ``base_y`` (in length units), ``left_1`` and so on (in rad): the
           configuration;
         - ``left_x``, ``left_y``, ``right_x`` and ``right_y`` (in length units): the positions of
@@ -110,9 +124,10 @@ class Trajectory:
         return frame
 
     def plot(self) -> Figure:
-        """Return a figure of the robot at the start (pale) and at each hit.
+        """Return a figure of the robot at the start and at each hit.
 
-        The figure also shows the path of the hand that hits each goal.
+        Earlier postures are paler. The figure also shows the goals, and for each goal the path of
+        the hand that hits it.
         """
         from matplotlib.figure import Figure
 
@@ -148,15 +163,16 @@ class Trajectory:
         path : str or pathlib.Path
             The file, ``.gif`` or, if ffmpeg is installed, ``.mp4``.
         width : int
-            Width in pixels, from 200 to 3840 (in an MP4 up to 2 fewer).
+            Width in pixels, from 200 to 3840. The width of an MP4 is even, and can be up to 2
+            pixels less.
         replace : bool
             True to overwrite an existing file.
 
         Raises
         ------
         CoarticError
-            The file has another suffix, no control tick was made, or the file exists or cannot be
-            written.
+            The solution takes no ticks, the file has another suffix, ffmpeg is missing or fails,
+            the file exists and ``replace`` is False, or the file cannot be written.
         ArgumentError
             An argument has a wrong type, or ``width`` is out of range.
         """
@@ -169,7 +185,7 @@ class Trajectory:
 def trajectory(
     task: TaskLike, movements: Iterable[Movement], model: MotionModel = PAPER
 ) -> Trajectory:
-    """Execute a solution, and return its configuration at every control tick.
+    """Execute a solution, and return the robot's configuration at each control tick.
 
     The number of ticks and the configurations at the hits are the same as in
     :func:`coartic.execute`, bit for bit.
@@ -180,18 +196,19 @@ def trajectory(
     movements : iterable of Movement
         The solution: at least one movement for each goal, in the order of the goals.
     model : MotionModel
+        The motion model, without motor noise.
 
     Returns
     -------
     Trajectory
-        The configurations tick by tick, and the rows in which the goals were hit.
+        The configurations, and the indices of the rows in which the goals were hit.
 
     Raises
     ------
     TaskError
         The task cannot be used.
     TypeError
-        The task is not a Task, a string or a path.
+        The task is not a Task, a string or a path, or the model is not a MotionModel.
     SolutionError
         The solution breaks the task's rules, or does not hit every goal.
     ValueError

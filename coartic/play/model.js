@@ -243,7 +243,7 @@ class Trial {
     this.going = true;
   }
 
-  /* coartic/motion/solution.py: make a movement and note it; return whether it hits. */
+  /* Make a movement and note it; return whether it hits. */
   moves(goal, hand, kind, target) {
     const signed = move(this.problem, this.q, target, goal, hand, kind !== "corrective");
     const ticks = Math.abs(signed);
@@ -297,12 +297,12 @@ function make_trial(problem, hands, targets) {
   return trial;
 }
 
-/* coartic/motion/solution.py */
+/* coartic/motion/execution.py */
 function corrective_trial(problem, hands) {
   return make_trial(problem, hands, hands.map(() => null));
 }
 
-/* coartic/motion/solution.py: execute movements, each with goal, hand, kind and target. */
+/* coartic/motion/execution.py: execute movements, each with goal, hand, kind and target. */
 function execute(problem, movements) {
   const trial = new Trial(problem);
   for (let goal = 0; trial.going && goal < problem.goals.length; goal += 1) {
@@ -341,7 +341,7 @@ function trajectory(problem, trial) {
   return { rows: rows.length ? rows : [problem.start], hits };
 }
 
-/* coartic/motion/solution.py: all hand sequences. */
+/* coartic/motion/execution.py: all hand sequences. */
 function hand_sequences(problem) {
   return problem.goals.reduce(
     (sequences) => sequences.flatMap((sequence) => problem.hands.map((hand) => [...sequence, hand])),
@@ -351,7 +351,7 @@ function hand_sequences(problem) {
 
 const letters_of = (hands) => hands.map((hand) => "LR"[hand]).join("");
 
-/* coartic/motion/solution.py: the hands that the task names, or that its policy finds. */
+/* coartic/motion/execution.py: the hands that the task names, or that its policy finds. */
 function initial_hands(problem, named = problem.task.initial_hands) {
   if (/^[LR]+$/.test(named)) return [...named].map((letter) => "LR".indexOf(letter));
   const single = problem.hands.map((hand) => problem.goals.map(() => hand));

@@ -16,13 +16,14 @@ from coartic.tasks.task import Task, shipped_tasks
 
 FOLDER = Path(__file__).parent
 UP_OR_DOWN = ("ascending", "descending")
-"""Tasks with the same start and first goal; by default the page begins with them."""
+"""Names of two tasks with the same start and first goal. By default the page begins with them."""
 
 
 def play_page(task: Task | None = None) -> str:
-    """Return the page of ``coartic play``, one HTML file that needs no other.
+    """Return the page of ``coartic play`` as HTML that needs no other file.
 
-    The page offers all shipped tasks. It begins with ``task``, by default with :func:`up_or_down`.
+    The page offers the shipped tasks of the paper. It begins with ``task``, by default with the two
+    tasks of :func:`up_or_down`.
     """
     presets = [preset_of(shipped) for shipped in shipped_tasks().values()]
     if task is None:
@@ -55,10 +56,13 @@ def player_figure(presets: Sequence[dict[str, Any]], **options: Any) -> str:
         Optional data for the scripts, such as :func:`coartic.analysis.report.player.player`
         returns:
 
-        - ``page``: address to which links lead, None for no link;
-        - ``first``: what is shown at first;
-        - ``folder``: folder with the stored runs, quoted for a shell;
-        - ``cells``: cells of tables that start films: for each cell, its id and the film.
+        - ``page``: address to which links lead, or None for no links. By default the figure is the
+          page itself, and links lead to its own address;
+        - ``first``: dict that maps entries of the state of the figure, such as ``preset`` (an index
+          of ``presets``) and ``who`` (who moves the robot), to their first values;
+        - ``folder``: results folder with the stored runs, quoted for a shell;
+        - ``cells``: a pair for each table cell that starts a film: the id of the HTML element, and
+          a dict with ``preset`` and ``who``.
     """
     content = {"presets": presets, "version": coartic.__version__, **options}
     data = json.dumps(content, allow_nan=False, separators=(",", ":"))
@@ -80,8 +84,8 @@ def preset_of(task: Task) -> dict[str, Any]:
     The keys are
 
     - ``label``: the task's label, with † if its goals are reconstructed;
-    - ``task``: the fields that the figure needs, as plain data;
-    - ``optimum``: reward of the best known solution if it is proven to be the best, otherwise None.
+    - ``task``: dict of the task's fields that the figure needs, as plain data;
+    - ``optimum``: the best known reward if it is proven to be the optimum, otherwise None.
     """
     keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot"}
     mark = " †" if "goals" in task.reconstructed else ""
@@ -93,10 +97,11 @@ def preset_of(task: Task) -> dict[str, Any]:
 
 
 def up_or_down() -> dict[str, Any]:
-    """Return a preset (:func:`preset_of`) for two tasks with the same first goal.
+    """Return a preset for the two tasks ``ascending`` and ``descending``.
 
-    ``task`` is ``ascending``, ``others`` are the later goals of ``descending``, and ``optimum`` is
-    None.
+    The result is the dict of :func:`preset_of` for ``ascending`` with the label ``Up or down``. Its
+    ``optimum`` is None, and ``others`` contains the goals of ``descending`` after the first goal,
+    which the tasks share.
     """
     up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
     return {**preset_of(up), "label": "Up or down", "others": down.goals[1:], "optimum": None}

@@ -1,4 +1,5 @@
-"""Runs as they are planned and stored.
+"""Declarations of methods, and runs as they are planned and stored.
 
-Modules of this package use a method's name, version and parameters, but not its code.
+Only :mod:`~coartic.runs.method_info` imports the code of methods. The other modules use the
+declarations.
 """

@@ -27,7 +27,7 @@ from coartic.model import MotionModel, differences
 from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
-"""Origin of the methods of this project."""
+"""Value of :attr:`MethodInfo.origin` for the built-in methods."""
 ALWAYS_IN_IDS = frozenset(
     {
         *("base", "chains", "corrects", "counted", "credit", "direction", "discount", "drift"),
@@ -36,9 +36,9 @@ ALWAYS_IN_IDS = frozenset(
         *("other_arm", "period", "pull", "rounds", "sigma", "starts", "stop", "stored", "trials"),
     }
 )
-"""Names of parameters that are always a part of the id of a run. Do not add names. Any other
-parameter is a part of the id only if its value is not the default. Therefore a new parameter of a
-method, or a new field of an exploration condition, does not change the ids of existing runs."""
+"""Names of parameters that are always hashed for the id of a run. Do not add names. Any other
+parameter is hashed only if its value is not the default. Therefore a new parameter of a method, or
+a new field of an exploration condition, does not change the ids of existing runs."""
 VERSION = re.compile(r"\d+\.\d+")
 """Pattern of the field ``code`` of a built-in method: versions of model and method."""
 
@@ -54,7 +54,8 @@ class MethodInfo:
     information: tuple[str, ...]
     """Information that the method declares."""
     stochastic: bool
-    """True if the results depend on the seed; other methods are run once on a task."""
+    """True if the results depend on the seed. A method that is not stochastic is run once on each
+    task."""
     defaults: dict[str, Any]
     """Dict that maps each parameter to its default; None for a parameter without a default."""
     origin: str
@@ -63,9 +64,11 @@ class MethodInfo:
     """Versions of model and method, such as ``1.2``. For a method file it is a hash of the code
     (:mod:`coartic.benchmarks.method_files`)."""
     packages: dict[str, str] = field(default_factory=dict, compare=False)
-    """Dict that maps each installed package that the method file imports to its version."""
+    """Dict that maps installed packages to their versions: those that the method file, or another
+    file of the user that it loads, imports. Empty for a built-in method."""
     facts: Facts = field(default_factory=Facts, compare=False)
-    """Works, short name and algorithm. Folders of 6.0.0 do not have them."""
+    """Citations and names of the method. Results folders store them only for methods from files.
+    Results folders of version 6.0.0 do not store them at all."""
     tuned_on: str = field(default="", compare=False)
     """Tasks on which the method's parameters were chosen; not stored."""
     where: str = field(default="", compare=False)
@@ -84,8 +87,8 @@ class MethodInfo:
     def load(self) -> type[Method]:
         """Import the method and return its class.
 
-        A process imports the method once for each ``code``. It does not notice when the file
-        changes.
+        A process imports a method file once for each ``code``; it does not import the file again
+        when the file changes. Raises the errors of :func:`load_method`.
         """
         return load_method(*self.key)
 
@@ -101,8 +104,8 @@ class MethodInfo:
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """Return a dict of the parameters that identify a run, as plain data.
 
-        The dict contains the parameters of :data:`ALWAYS_IN_IDS`, and all parameters that differ
-        from their defaults. Raises CoarticError for a wrong parameter.
+        The dict contains those parameters of the method that are in :data:`ALWAYS_IN_IDS`, and all
+        parameters that differ from their defaults. Raises CoarticError for a wrong parameter.
         """
         return dict(self._ask("complete", parameters))
 
@@ -123,22 +126,23 @@ class MethodInfo:
         return None if reason is None else plain(str(reason))
 
     def rules(self) -> dict[str, Any]:
-        """Return the settings of the method that the check of its conformance needs.
+        """Return the settings of the method that ``coartic check`` needs.
 
         Returns
         -------
         dict
             - ``quick``: :attr:`.Method.quick`;
-            - ``config``: two of pydantic's settings of the class of its parameters: ``extra``
-              (``"forbid"`` if unknown parameters are refused) and ``frozen`` (True if parameters
-              cannot be set).
+            - ``config``: dict with two settings of pydantic for the class of the parameters:
+              ``extra`` is ``"forbid"`` if unknown parameters are refused, and ``frozen`` is True if
+              parameters cannot be changed. A setting that the class does not make is None.
         """
         return dict(self._ask("rules"))
 
     def _ask(self, question: str, *arguments: Any) -> Any:
         """Ask the method a question (:func:`answer`), and return the answer.
 
-        A method from a file is asked in the process that has imported this file.
+        If another process has read the method's file (:data:`READERS`), that process answers.
+        Otherwise this process imports the method.
         """
         if self.where in READERS:
             return READERS[self.where](self.name, question, *arguments)
@@ -146,8 +150,9 @@ class MethodInfo:
 
 
 READERS: dict[str, Callable[..., Any]] = {}
-"""Dict that maps the path of each method file that was read to a function. The function asks the
-process that has imported the file, because this process does not import method files."""
+"""Dict that maps the path of each method file to a function. The function passes the id of a
+method, a question and its arguments to the process that has imported the file, and returns the
+answer. (The process that runs suites does not import method files.)"""
 
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
@@ -158,7 +163,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
     method : type
         Class of the method.
     question : {"complete", "inapplicable_reason", "refuses", "rules"}
-        Name of the function of :class:`MethodInfo` whose result is returned.
+        Name of the function of :class:`MethodInfo` that needs the answer.
     *arguments
         Arguments of the question:
 
@@ -166,13 +171,14 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         - ``"refuses"``: the constants of a motion model;
         - ``"complete"``: the parameters of the method;
         - ``"inapplicable_reason"``: the parameters of the method, then the entries of an
-          :class:`Outline`.
+          :class:`.Outline`.
 
     Raises
     ------
     CoarticError
         A parameter is wrong, or the method cannot say whether it applies. Other errors of the
-        method's own check of parameters are raised as they are.
+        method's own check of parameters, and errors of its function ``refuses``, are raised as they
+        are.
     """
     if question == "refuses":
         return method.refuses(MotionModel(*arguments))
@@ -210,7 +216,8 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
     """Make the declaration of a method from its class.
 
-    ``origin``, ``where`` and ``code`` are fields of the :class:`MethodInfo`.
+    ``origin``, ``where`` and ``code`` are fields of the :class:`MethodInfo`. Raises CoarticError
+    for a parameter whose default is infinite or NaN.
     """
     return MethodInfo(
         name=method.name,
@@ -228,7 +235,7 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 
 def _defaults(method: type[Method]) -> dict[str, Any]:
-    """Return a dict that maps the parameters of a method to defaults.
+    """Return a dict that maps a method's parameters to their defaults, as plain data.
 
     The value of a parameter without a default is None. Raises CoarticError for a default that is
     infinite or NaN.
@@ -241,9 +248,10 @@ def _defaults(method: type[Method]) -> dict[str, Any]:
 
 
 def _plain_parameters(method: type[Method], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a dict that maps parameters to values, as plain data.
+    """Return a copy of ``values`` in which each value is plain data.
 
-    Raises CoarticError for a value that contains infinity or NaN, which cannot be written as JSON.
+    A value that JSON does not have becomes a string. Raises CoarticError for a value that contains
+    infinity or NaN.
     """
     plain_values = {}
     for name, value in values.items():
@@ -272,7 +280,8 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
     Raises
     ------
     CoarticError
-        No method has this id. Errors of the import are raised as they are.
+        The module or file defines no method with this id. Errors of the import are raised as they
+        are.
     """
     if where.endswith(".py"):
         methods = methods_in(load_file(Path(where), code)[0])
@@ -287,8 +296,8 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
 def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Method]]:
     """Return the classes of methods that a module defines itself, not those that it imports.
 
-    If ``abstract`` is True, only the classes that lack a function, such as ``solve``, are returned.
-    Otherwise only the classes that lack no function are returned.
+    If ``abstract`` is True, only the classes that do not define every required function, such as
+    ``solve``, are returned. Otherwise only the classes that define all of them are returned.
     """
     return [
         value
@@ -302,7 +311,7 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
 
 @cache
 def load_file(path: Path, code: str = "") -> tuple[ModuleType, frozenset[str]]:
-    """Import a method file, and find out which modules it loads.
+    """Import a method file, and find out which modules are loaded with it.
 
     A process imports the file once for each ``code``, a hash of the code. The file and the user's
     modules are compiled from their source (:func:`.import_from`). Errors of the file are raised as
@@ -313,7 +322,8 @@ def load_file(path: Path, code: str = "") -> tuple[ModuleType, frozenset[str]]:
     module
         The module of the file.
     frozenset of str
-        Names of the modules that were loaded by its import, without the module itself.
+        Names of the modules that the import has loaded. The module itself, and modules that were
+        loaded before, are left out.
     """
     name = f"coartic_method_{path.stem}"
     import_from(path.parent)

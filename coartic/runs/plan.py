@@ -22,15 +22,15 @@ from coartic.tasks.task import Task
 
 @dataclass(frozen=True)
 class Cell:
-    """A method with its parameters on a task, and the budget of trials of a run."""
+    """A method with its parameters on a task, with a motion model and a trial budget."""
 
     task: Task
     method: MethodInfo
     parameters: dict[str, Any]
     """Dict that maps parameters of the method to values (:meth:`.MethodInfo.complete`)."""
     trial_budget: int | None = None
-    """Largest number of trials of a run, without the search for initial hands; None for no
-    limit."""
+    """Largest number of trials of a run; None for no limit. Trials of the search for initial hands
+    are not counted."""
     model: MotionModel = PAPER
     """Motion model of the trials and of the scoring, with the tolerances for the task."""
 
@@ -39,12 +39,15 @@ class Cell:
 
     @cached_property
     def world(self) -> str:
-        """Constants that differ from the paper's model, such as ``motor_noise=0.01``, or ``""``."""
+        """Constants in :data:`.WORLD` that differ from the paper's; empty for the paper's world.
+
+        An example is ``motor_noise=0.01``. Other constants, such as tolerances, are not named.
+        """
         return describe_parameters(differences(self.model))
 
     @property
     def setting(self) -> str:
-        """Parameters that differ from the defaults, such as ``noise_sd=0.1``; empty for none."""
+        """Parameters that differ from ``method.defaults``, such as ``noise_sd=0.1``, or ``""``."""
         defaults = self.method.defaults
         return describe_parameters(
             {
@@ -56,7 +59,10 @@ class Cell:
 
     @property
     def trials(self) -> int | None:
-        """Requested number of trials: parameter ``trials``, but at most :attr:`trial_budget`."""
+        """Requested number of trials: parameter ``trials``, but at most :attr:`trial_budget`.
+
+        None if the method does not have this parameter.
+        """
         trials = trials_in(self.parameters)
         return min(trials, self.trial_budget or trials) or None
 
@@ -67,7 +73,7 @@ class Cell:
 
     @cached_property
     def id(self) -> str:
-        """Id of the cell: 16 hex digits of :attr:`digest`, a hyphen, and ``MethodInfo.code``."""
+        """Id of the cell: the first 16 digits of :attr:`digest`, ``-`` and ``MethodInfo.code``."""
         return f"{self.digest[:16]}-{self.method.code}"
 
     @cached_property
@@ -77,15 +83,15 @@ class Cell:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of task, method, parameters, model and trial budget: 64 hex digits.
+        """Hash of task, id of the method, parameters, model and trial budget: 64 hex digits.
 
-        The code of the method and the time limit are not part of the hash.
+        The code of the method and the time limit are not hashed.
         """
         return hash_of(self.content | {"method": self.method.name})
 
     @property
     def content(self) -> dict[str, Any]:
-        """The cell as plain data, as it is stored, with the motion model."""
+        """The cell as it is stored: a dict of plain data."""
         method = asdict(replace(self.method, tuned_on="", where=""))
         if self.method.is_ours:
             del method["facts"]  # they are in its class
@@ -100,24 +106,31 @@ class Cell:
 
 @dataclass(frozen=True)
 class Job:
-    """Runs of one cell that a worker process performs together."""
+    """Runs of one cell, with their seed and limits.
+
+    A plan has one job for each cell. To perform a plan, its jobs are divided into smaller jobs; a
+    worker process performs the runs of such a job together.
+    """
 
     cell: Cell
     seed: int
     """Seed of the suite."""
     numbers: Sequence[int]
     """Numbers of the runs of the job; the runs of a cell are numbered from 0. In a plan the numbers
-    are a range. The plan of a results folder stores a job with runs 50 to 99 as a job with runs 0
-    to 99."""
+    are a range. A results folder stores only the largest number of the range, so that a job with
+    the runs 50 to 99 is read back as a job with the runs 0 to 99."""
     time_limit_s: float | None = None
-    """Limit of the total CPU time of all runs of the job (in s); None for no limit."""
+    """Limit of the total CPU time of all runs of the job (in s). None stands for a day
+    (:class:`.Local`)."""
     suite: str = ""
     """Name of the suite that asks for the runs."""
     trials: int | None = None
-    """Number of trials of a run that the command asks for, or, if the command does not set it, the
-    suite's file; at most the trial budget."""
+    """Number of trials of a run that the command sets or, by default, that the suite sets. It is at
+    most the trial budget. If neither sets a number, it is the trial budget, or None without a
+    budget."""
     question: tuple[str, str] | None = None
-    """Title and description of a suite of the user's own on its own tasks; otherwise None."""
+    """Title and description of the suite, if the suite is the user's own and the command adds no
+    tasks to it; otherwise None."""
 
     def run_id(self, number: int) -> str:
         """Return the id of a run.
@@ -157,11 +170,12 @@ def cell_of(
         Dict that maps parameters of the method to values. For a parameter that is not passed, the
         default is used.
     trials : int, optional
-        Default of parameter ``trials``, for methods that have it.
+        Default of parameter ``trials``, if the method has this parameter. By default it is the
+        default of the method.
     trial_budget : int, optional
-        Largest number of trials of a run.
+        Largest number of trials of a run; by default there is no limit.
     model : MotionModel
-        The world of the runs.
+        Motion model of the runs.
 
     Returns
     -------
@@ -179,7 +193,7 @@ def cell_of(
 
 
 def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
-    """Return a dict that maps names to tasks.
+    """Return a dict that maps the names of tasks to the tasks.
 
     Raises CoarticError if two different tasks have the same name.
     """
@@ -195,8 +209,8 @@ def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
 def run_seed(suite_seed: int, task: str, number: int) -> int:
     """Return the seed of a run.
 
-    The seed depends only on the suite's seed, the task's name and the run's number. The seed does
-    not depend on the method, so that the runs of two methods are paired.
+    The seed depends only on the suite's seed, the task's name and the run's number. It does not
+    depend on the method, so that the runs of two methods are paired.
     """
     return _seed_of(suite_seed, task, number)
 
@@ -204,8 +218,8 @@ def run_seed(suite_seed: int, task: str, number: int) -> int:
 def judge_seed(suite_seed: int, task: str, number: int) -> int:
     """Return the seed of the noise for scoring run ``number`` of a task.
 
-    The seed is a hash of the suite's seed, the task's name, the run's number and the word *judge*.
-    The seed is the same for all methods, and no method sees noise with this seed in its own trials.
+    The seed is computed from the suite's seed, the task's name and the run's number. It is the same
+    for all methods, and no method sees noise with this seed in its own trials.
     """
     return _seed_of(suite_seed, f"{task} judge", number)
 
@@ -240,17 +254,17 @@ def describe_parameters(parameters: Mapping[str, Any]) -> str:
 
 
 def world_title(world: str) -> str:
-    """Return a readable name of a world from the text of :attr:`Cell.world`.
+    """Return the name of a world for a sentence, such as ``the world motor_noise=0.01``.
 
-    Examples are ``the paper's world`` and ``the world motor_noise=0.01``.
+    ``world`` is the text of :attr:`Cell.world`; the empty string gives ``the paper's world``.
     """
     return f"the world {world}" if world else "the paper's world"
 
 
 def trials_in(parameters: Mapping[str, Any]) -> int:
-    """Return the value of parameter ``trials``, or 0 if there is none.
+    """Return the value of parameter ``trials``, or 0 if there is no such parameter.
 
-    The result is 0, too, if the value is not an ``int`` above 0.
+    The result is also 0 if the value is not an ``int`` above 0.
     """
     trials = parameters.get("trials")
     return trials if type(trials) is int and trials > 0 else 0

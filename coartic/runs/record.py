@@ -1,4 +1,4 @@
-"""The result of a run: the outcome that a worker returns, and the stored row."""
+"""The result of a run: the outcome that a worker returns, and the row that is stored."""
 
 from __future__ import annotations
 
@@ -35,26 +35,27 @@ PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
 ``initial`` (the first trial of a learner) and ``replay`` (a greedy trial after learning)."""
 PARTS = tuple(PREFIXES)
 MOTOR_NOISE = 0.01
-"""Standard deviation of the motor noise in the scoring of solutions, in length units and rad
-(:func:`coartic.execute_noisy`)."""
+"""Standard deviation of the motor noise with which solutions that were found in the paper's world
+are scored a second time, in length units and rad (:func:`coartic.execute_noisy`). Solutions of a
+world with motor noise are scored with the noise of that world."""
 NOISY_EXECUTIONS = 100
 """Number of executions of each solution with motor noise."""
 NOISE_RULE = 2
-"""Version of the rule of motor noise. Ticks that follow another version are shown as missing until
-they are computed again, so that a column never mixes two rules. Raise it with a change of
-:mod:`coartic.motion.kernels.noise` or of the judge's seeds."""
+"""Version of the rule of motor noise. Mean ticks that were computed by another version are shown as
+missing until they are computed again, so that a column never mixes two versions. Increase the
+version with each change of :mod:`coartic.motion.kernels.noise` or of :func:`.judge_seed`."""
 OF_NOISE = ("noisy_ticks", "mean_ticks", "failed_executions")
 """Names of the columns that depend on the rule of motor noise."""
 UNREPEATED = "made_again"
-"""Key in the details of a run. Its value is the difference that was found when the run was made
-again."""
+"""Key in the details of a run that was performed again with another result. The value describes
+the first difference."""
 _MAX_MOVEMENTS = 10_000
 """Largest number of movements of a solution."""
 _MAX_NUMBERS = 400_000
 """Largest number of entries in the start, the targets and the waypoints of a solution."""
 MAX_STEPS = 1_000_000
-"""Largest number of steps of the movements of a solution. The steps are counted on the straight
-path from the start through all targets and waypoints."""
+"""Largest number of steps of the movements of a solution. The steps are counted on straight lines
+from the start through all targets and waypoints."""
 
 
 @dataclass(frozen=True)
@@ -71,9 +72,10 @@ class Times:
     warm: bool | None = None
     """True if the process had run the method before; None if unknown."""
     together: int = 1
-    """Number of runs of the job, which were made together."""
+    """Number of runs of the job."""
     peak_rss_mib: float | None = None
-    """Largest memory of the worker so far, including earlier runs (in MiB); None if unknown."""
+    """Peak resident memory of the worker so far, including earlier runs (in MiB); None if
+    unknown."""
 
 
 @dataclass(frozen=True)
@@ -83,16 +85,16 @@ class Outcome:
     status: Status
     """``ok``, ``infeasible``, ``solver-failed``, ``timeout`` or ``crashed``."""
     reason: str = ""
-    """Why the run is not ok; empty if it is ok."""
+    """Why the status is not ``ok``; empty if it is ``ok``."""
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)
-    """Dict that maps parts (``solution``, ``initial``, ``replay``) to movements, before
-    execution."""
+    """Dict that maps parts (``solution``, ``initial``, ``replay``) to their movements, as the
+    method returned them."""
     details: dict[str, Any] = field(default_factory=dict)
-    """Further data from the method or the process, by name."""
+    """Further data from the method, by name."""
     used: tuple[str, ...] = ()
     """Declared information that the method used."""
     meter: Meter | None = None
-    """Counts of trials, evaluations and movements; None if the worker gave no answer."""
+    """Counts of trials, evaluations and movements; None if the worker gave no usable answer."""
     rewards: list[Annotated[int, Field(gt=-(2**31), lt=2**31)] | None] = field(default_factory=list)
     """Reward of each trial; None if the trial failed or its reward is not stored."""
     times: Times = Times()
@@ -108,20 +110,23 @@ class Row:
     job: Job
     """A job with only this run."""
     values: dict[str, Any]
-    """Values of the columns of table ``results``, by name (:data:`COLUMNS`): ``row["reward"]``."""
+    """Dict that maps the columns of table ``results`` (:data:`COLUMNS`) to their values.
+    ``row["reward"]`` is short for ``row.values["reward"]``."""
     movements: dict[str, list[list[Any]]]
-    """Dict that maps parts (``solution``, ``initial``, ``replay``) to the executed movements, as
-    lists (:func:`movement_data`); empty if the run is not ok. With motor noise the solution has the
-    movements that the method recommends, without ticks."""
+    """Dict that maps parts (``solution``, ``initial``, ``replay``) to the executed movements, each
+    as a list (:func:`movement_data`). The dict is empty if the run is not ok. In a world with motor
+    noise, the only part is the solution: the movements that the method recommends, without
+    ticks."""
     rewards: list[int | None]
     """Reward of each trial; None if the trial failed or its reward is not stored."""
     details: dict[str, Any]
-    """Further data from the method or the process, by name."""
+    """Further data from the method, by name. Entry :data:`UNREPEATED` is added if the run was
+    performed again with another result."""
     environment: dict[str, Any]
     """Versions, platform, processor, variables, arithmetic and commit, by name."""
 
     def __getitem__(self, name: str) -> Any:
-        """Return the value of a column."""
+        """Return the value of a column of table ``results``."""
         return self.values[name]
 
     @property
@@ -136,7 +141,7 @@ class Row:
         return failed is not None and self.rewards.count(None) > failed
 
     def part(self, name: str) -> list[Movement]:
-        """Return the movements of a part; empty if the run does not have it."""
+        """Return the list of movements of a part; empty if the run lacks the part."""
         return [*map(movement_from, self.movements.get(name, []))]
 
     def with_values(self, **values: Any) -> Row:
@@ -149,8 +154,9 @@ class Row:
     def downsample(self) -> Row:
         """Return a copy of the row with fewer rewards.
 
-        The copy keeps the rewards of the best trial and of each trial that was better than all
-        earlier trials. All other rewards are None.
+        The copy keeps the reward of each trial that was better than all earlier trials, and that of
+        the trial in column ``best_trial``. All other rewards are None. The hash in column
+        ``result`` is computed again.
         """
         best, solved, rewards = -math.inf, self["best_trial"], list[int | None]()
         for trial, reward in enumerate(self.rewards):
@@ -168,8 +174,8 @@ _NOTHING = SimpleNamespace(reward=None, hands=None, corrections=None, other_arm_
 def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date: str = "") -> Row:
     """Return the row of a run from its outcome and the executions of its parts.
 
-    The columns of ticks with noise are empty; :func:`coartic.benchmarks.scoring.with_noise` fills
-    these columns.
+    The columns in :data:`OF_NOISE` and ``noise_rule`` are None;
+    :func:`coartic.benchmarks.scoring.with_noise` sets them.
 
     Parameters
     ----------
@@ -178,9 +184,9 @@ def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date
     outcome : Outcome
         The outcome, with its final status.
     executions : mapping of str to Execution
-        Maps parts to executions without noise; empty if the run is not ok.
+        Dict that maps parts to executions without noise; empty if the run is not ok.
     date : str
-        Date and time, UTC.
+        Date and time at the end of the run, UTC.
     """
     number, is_noisy = job.numbers[0], job.cell.model.motor_noise > 0.0
     parts: dict[str, Any] = {part: executions.get(part, _NOTHING) for part in PARTS}
@@ -221,9 +227,10 @@ def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date
 
 
 def _corrections_by_tenth(details: Mapping[str, Any]) -> list[int] | None:
-    """Return a learner's corrections in trial 0 and each tenth of later trials.
+    """Return a learner's numbers of corrections, by parts of its trials.
 
-    ``details`` are those of the run. The result is None if the corrections were not counted.
+    The result is a list of 11 numbers: the number in trial 0, and that in each tenth of the later
+    trials. It is None if ``details``, the details of the run, do not contain such a list.
     """
     counts = details.get(CORRECTIONS_BY_TENTH)
     if not isinstance(counts, list) or len(counts) != 11:
@@ -235,7 +242,8 @@ def _corrections_by_tenth(details: Mapping[str, Any]) -> list[int] | None:
 def _practice_of(rewards: Sequence[int | None]) -> str:
     """Return the mean ticks in each tenth of the trials, as JSON.
 
-    The JSON is a list of ten numbers, with null for a tenth without a completed trial.
+    The JSON is a list of ten numbers: the mean over the completed trials of each tenth, or null for
+    a tenth without a completed trial. ``rewards`` are those of all trials.
     """
     tenths = np.array_split(np.array(rewards, np.float64), 10)
     means = [-float(np.nanmean(part)) if np.isfinite(part).any() else None for part in tenths]
@@ -245,10 +253,9 @@ def _practice_of(rewards: Sequence[int | None]) -> str:
 def _result_of(
     status: str, movements: Mapping[str, Sequence[list[Any]]], rewards: Sequence[int | None]
 ) -> str:
-    """Return the hash of status, movements and stored rewards of a run: 16 hex digits.
+    """Return a hash of the status, the movements and the stored rewards of a run.
 
-    The hash includes the ticks and configurations of the movements. It does not include times and
-    counts.
+    The hash has 16 hex digits. Times and counts are not hashed.
     """
     stated = [[part, *data] for part in PARTS for data in movements.get(part, [])]
     content = json.dumps([status, *stated]).encode()
@@ -340,22 +347,24 @@ COLUMNS = (
      "versions of model and method, such as `1.2`; of a method file a hash of its code"),
     ("packages", "TEXT", "", "hash of the versions of Python and of libraries"),
 )  # fmt: skip
-"""Columns of view ``runs``, which has a row for each stored run of the plan. SQL, data frames and
-documentation are made from them. A column has
+"""Columns of view ``runs``, which has a row for each stored run of the plan. SQL tables, data
+frames and a page of the documentation are made from this tuple. An entry consists of
 
-- its name;
-- its type in SQL, with ``NOT NULL`` if all runs have a value in table ``results``;
-- its source in :func:`row_of`; ``later`` for ticks with noise, empty for a column of another table;
+- the name of the column;
+- the type of the column in SQL, with ``NOT NULL`` if all runs have a value in table ``results``;
+- the source of the value in :func:`row_of`, such as ``counts.trials``. The source ``later`` stands
+  for None, which is replaced later. The source is empty for a column of another table;
 - a phrase for the documentation."""
 
 
 def movement_data(movement: Movement) -> list[Any]:
     """Return a movement as a list of its goal, hand, kind, ticks and path.
 
-    Workers send movements in this form, hashes are computed from it, and folders store it. The path
-    is JSON: the target, or the waypoints of a movement of kind ``path``. -0.0 becomes 0.0. Missing
-    ticks and a missing target are None. Raises an error, such as TypeError or ValueError, for a
-    movement that cannot be converted.
+    Workers send movements in this form, hashes are computed from it, and folders store it. The last
+    entry of the list is a JSON string: the target, or the waypoints of a movement of kind ``path``.
+    In the string, -0.0 is 0.0, and an entry of a target that is NaN is null. If the movement has no
+    ticks or no target, the entry of the list is None. Raises an error, such as TypeError or
+    ValueError, for a movement that cannot be converted.
     """
     m, path = movement, movement.target
     if m.waypoints is not None:
@@ -373,7 +382,7 @@ def movement_data(movement: Movement) -> list[Any]:
 
 
 def movement_from(data: Sequence[Any]) -> Movement:
-    """Return a movement from the list of :func:`movement_data`.
+    """Return the movement that :func:`movement_data` converted to a list.
 
     Wrong data may raise TypeError, ValueError or IndexError.
     """
@@ -387,10 +396,11 @@ def movement_from(data: Sequence[Any]) -> Movement:
 def reward_bytes(rewards: Sequence[int | None]) -> bytes:
     """Encode the rewards of trials as bytes, which the caller compresses.
 
-    Each number has four bytes. The first number is the best reward, signed (0 if there is none).
-    The number of each trial is 1 plus the difference between the best reward and the reward of the
-    trial, or 0 if the reward of the trial is None. The lowest bytes of all numbers come first, then
-    the second lowest bytes of all numbers, and so on, because bytes compress better in this order.
+    The bytes encode numbers of four bytes: the best reward, signed (0 if there is none), and then
+    a number for each trial. The number of a trial is 1 plus the difference between the best reward
+    and the reward of the trial, or 0 if the reward of the trial is None. The lowest bytes of all
+    numbers come first, then the second lowest bytes of all numbers, and so on, because bytes
+    compress better in this order.
     """
     values = np.array(rewards, np.float64)  # None becomes NaN
     best = 0.0 if np.isnan(values).all() else np.nanmax(values)
@@ -414,8 +424,9 @@ def execute_all(
     Returns
     -------
     list of Execution or Exception
-        Execution of each solution, in order. For a solution that breaks the rules of the task or is
-        too long (:func:`too_long`), the entry is the error, which is not raised.
+        Execution of each solution, in the order of ``solutions``. For a solution that breaks the
+        rules of the task or is too long (:func:`too_long`), the entry is an exception, which is not
+        raised.
     """
     exact = model.without_noise()
     errors = [too_long(task, solution, exact) for solution in solutions]
@@ -431,28 +442,27 @@ def judge(
     seeds: Sequence[int],
     executions: int = NOISY_EXECUTIONS,
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Compute the mean ticks of recommended solutions over many executions with motor noise.
+    """Compute the mean ticks of solutions over many executions with motor noise.
 
-    For a failed execution, twice the ticks that the corrective process with its best hands takes
-    without noise are used.
+    A failed execution counts as twice the ticks that the corrective process with its best hands
+    (:func:`.best_hands`) takes without noise.
 
     Parameters
     ----------
     task : Task
     answers : sequence of sequence of Movement
-        K solutions that methods recommend (:func:`.next_action`).
+        K solutions: the movements that methods recommend (:func:`.next_action`).
     model : MotionModel
         The motion model, with motor noise.
     seeds : sequence of int
-        Seed of the noise of each answer.
+        Seed of the noise for each answer.
     executions : int
         Number of executions of each answer.
 
     Returns
     -------
     ndarray, shape (K,)
-        Mean ticks; NaN if an execution failed and the corrective process does not complete the
-        task with any hands.
+        Mean ticks; NaN if an execution failed and :func:`.best_hands` finds no hands.
     ndarray of int, shape (K,)
         Number of executions of each answer that failed.
     """
@@ -472,7 +482,7 @@ def too_long(
 
     - more than 10,000 movements;
     - more than 400,000 numbers in the start, the targets and the waypoints;
-    - more than 1,000,000 steps on the straight path through them.
+    - more than 1,000,000 steps on straight lines from the start through all of them.
     """
     if len(solution) > _MAX_MOVEMENTS:
         return SolutionError(

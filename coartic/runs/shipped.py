@@ -1,7 +1,7 @@
 """Open the shipped results.
 
-``benchmarks/shipped/SUITE.sqlite.xz`` is the compressed file of a results folder. Script
-``docs/scripts/pack_shipped.py`` writes it.
+``benchmarks/shipped/SUITE.sqlite.xz`` is the compressed file of the results folder of a suite. The
+script ``docs/scripts/pack_shipped.py`` writes it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PACKED = ".sqlite.xz"
 
 
 def open_shipped(suite: str) -> AbstractContextManager[Store]:
-    """Open the shipped results of a suite in memory.
+    """Open the shipped results of a suite in memory, for reading in a ``with`` block.
 
     Raises CoarticError if no results of the suite are shipped, or if their file was changed or
     cannot be read.
@@ -44,15 +44,19 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
 
 
 def open_results(folder: Path) -> AbstractContextManager[Store]:
-    """Open a results folder for reading.
+    """Open a results folder for reading in a ``with`` block.
 
-    The name ``shipped`` opens the shipped results of the suite ``comparison``.
+    The name ``shipped`` opens the shipped results of the suite ``comparison``. Raises the errors of
+    :func:`.open_store` or :func:`open_shipped`.
     """
     return open_shipped("comparison") if str(folder) == SHIPPED else open_store(folder)
 
 
 def shipped_hashes() -> dict[str, str]:
-    """Read ``SHA256SUMS``: a dict that maps suites to the hashes of their compressed files."""
+    """Return a dict that maps shipped suites to SHA-256 hashes of their compressed files.
+
+    The hashes are read from ``SHA256SUMS``. Raises OSError or ValueError if that fails.
+    """
     lines = (SHIPPED_FOLDER / HASHES).read_text(encoding="ascii").splitlines()
     pairs = (line.split() for line in lines)
     return {name.removesuffix(PACKED): digits for digits, name in pairs}

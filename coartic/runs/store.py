@@ -2,8 +2,8 @@
 
 Table ``cells`` contains a row for each cell that a command has asked for. The *plan* of the folder
 consists of the cells of the last ``coartic run``; for all other cells, columns ``position`` and
-``runs`` are empty. Table ``results`` contains a row for each run, with the movements of the run and
-the rewards of its trials. The views ``runs`` and ``solutions`` show the runs of the plan;
+``runs`` are NULL. Table ``results`` contains a row for each run, with the movements of the run and
+the rewards of its trials. The views ``runs`` and ``solutions`` show only the runs of the plan;
 docs/results.md lists their columns.
 
 Only one process writes at a time. It writes finished runs in batches. After any interruption a
@@ -54,7 +54,8 @@ FORMAT = 8
 """Number of the format. A change of a table or a view must increase it."""
 OLDEST = 7
 """Oldest format that can be read, the format of version 6.0.0. Columns that this format lacks are
-shown as missing values; ``coartic run`` adds these columns to the folder into which it writes."""
+shown as missing values, except ``world``, which is shown as the empty string. ``coartic run`` adds
+these columns to the folder into which it writes."""
 _APPLICATION = 0x636F6172  # "coar"
 
 _KINDS = {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64", "BOOLEAN": "boolean"}
@@ -63,7 +64,8 @@ _DTYPES: dict[str, Any] = {
     **dict.fromkeys(("order", "goal", "ticks"), "Int64"),
     **{name: _KINDS[kind.split()[0]] for name, kind, *_ in COLUMNS},
 }
-"""Types of the columns of views in data frames; all allow missing values."""
+"""Dict that maps the columns of views to their types in data frames. All types allow missing
+values."""
 _CELL = TypeAdapter(Cell)
 _STORED = ", ".join(f"{name} {kind}" for name, kind, source, _ in COLUMNS if source)
 _NOISY = {name: f"CASE WHEN noise_rule = {NOISE_RULE} THEN {name} END AS {name}"
@@ -110,7 +112,7 @@ class Store:
     ) -> None:
         """Wrap an open connection.
 
-        ``content`` is the content of the file if the file is only in memory, otherwise None.
+        ``content`` is the content of the file if the database is in memory, otherwise None.
         """
         self.folder = folder
         self._db, self._content = connection, content
@@ -118,14 +120,17 @@ class Store:
     # The plan.
 
     def replace_plan(self, plan: Sequence[Job], made_with: Mapping[str, Any]) -> None:
-        """Replace the plan of the folder. Runs of the earlier plan stay in the file.
+        """Replace the plan of the folder.
+
+        Runs of the earlier plan stay in the file.
 
         Parameters
         ----------
         plan : sequence of Job
-            At least one job.
-        made_with : mapping
-            Versions, platform, commit, ``command`` and ``date`` of this command, by name.
+            At least one job. The suite, the seed, the limit of CPU time, ``trials`` and
+            ``question`` of the first job are stored for all jobs.
+        made_with : mapping of str to object
+            Versions, platform, commit, command and date (:func:`.made_with`).
 
         Raises
         ------
@@ -153,8 +158,9 @@ class Store:
     def plan(self) -> list[Job]:
         """Return the plan of the folder.
 
-        Attribute ``question`` of the jobs is None, and attribute ``where`` of their methods is
-        empty. Raises CoarticError if no plan is stored yet.
+        The runs of each job are numbered from 0. Attribute ``question`` of the jobs is None, and
+        attribute ``where`` of their methods is empty. Raises CoarticError if no plan is stored yet,
+        or if the stored plan is damaged.
         """
         made_with = self.made_with()
         limits = made_with.get("time_limit_s"), made_with.get("trials")
@@ -170,9 +176,11 @@ class Store:
         return plan
 
     def made_with(self) -> dict[str, Any]:
-        """Return versions, platform, commit, ``command`` and ``date`` of the last ``coartic run``.
+        """Return a dict with the environment and the options of the last ``coartic run``.
 
-        Raises CoarticError if no plan is stored yet.
+        The dict contains the entries of :func:`.made_with`, ``time_limit_s`` and, if they are set,
+        ``trials`` and ``question`` of the jobs of the plan. Raises CoarticError if no plan is
+        stored yet.
         """
         if not (rows := self._rows("SELECT content FROM suite")):
             raise CoarticError(f"{self.folder} is not finished: {_RESUME}")
@@ -181,10 +189,10 @@ class Store:
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """Write all changes of the block, or none if the block fails.
+        """Write all changes of a ``with`` block, or none if the block fails.
 
         A block within another block is a part of the outer block. Raises CoarticError for an error
-        of SQLite, such as a full disk.
+        of SQLite, for example if the disk is full.
         """
         if self._db.in_transaction:
             yield
@@ -207,17 +215,18 @@ class Store:
         Returns
         -------
         list of tuple
-            An entry ``(position, number, status, time_limit_s)`` for each run. ``position`` is the
-            position of the job of the run in the plan, from 0. ``time_limit_s`` is the limit of CPU
-            time (in s), or None for no limit.
+            A tuple ``(position, number, status, time_limit_s)`` for each run, in no defined order.
+            ``position`` is the position of the run's job in the plan, from 0. ``time_limit_s`` is
+            the limit of CPU time under which the run was made (in s), or None if no limit was set.
         """
         return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
     def count_outdated_runs(self) -> Counter[tuple[str, str, str]]:
-        """Count the planned runs that an older or other version of the method made.
+        """Count the stored runs that another version of a planned method made.
 
-        The result is keyed by triples: id of the method, version (or code) that made the runs, and
-        version (or code) in the plan.
+        A run is counted if it differs from a run of the plan only in the version of the method. The
+        result is a Counter whose keys are triples: the id of the method, the version (or hash of
+        the code) that made the runs, and the version (or hash of the code) in the plan.
         """
         query = """SELECT now.method, old.code, now.code, count(*) FROM suite
             JOIN cells AS now ON now.runs IS NOT NULL
@@ -227,12 +236,13 @@ class Store:
         return Counter({(name, old, now): count for name, old, now, count in self._rows(query)})
 
     def marks(self) -> dict[str, list[str]]:
-        """Return a dict that maps ids of methods to warnings about their stored runs.
+        """Return a dict that maps ids of methods to lists of warnings about them.
 
-        Only runs of the plan are considered. A warning is a sentence which says that
+        Only stored runs of the plan are considered, and only methods with a warning are included. A
+        warning is a sentence that says one of the following:
 
-        - a run that was made again gave another result;
-        - runs were made with other versions of packages that the method's file imports.
+        - A run was performed again with another result.
+        - Runs were made with other versions of packages that the method's file imports.
         """
         warnings_by_method = defaultdict[str, list[str]](list)
         query = f"""SELECT DISTINCT method, task FROM asked
@@ -253,10 +263,11 @@ class Store:
         return dict(warnings_by_method)
 
     def imports(self) -> dict[str, list[str]]:
-        """Return the packages that the files of methods import, as a dict keyed by id of method.
+        """Return a dict that maps ids of methods to the packages that their files import.
 
-        The values are lists of strings such as ``numpy 2.1.0``. All runs of the plan are
-        considered. Methods whose file imports no package are left out.
+        The value of a method is a sorted list of strings such as ``numpy 2.1.0``: the packages with
+        the versions with which the runs of the plan were made. Built-in methods, and methods whose
+        files import no package, are left out.
         """
         by_method = defaultdict[str, dict[str, None]](dict)
         for method, made, _ in self._packages():
@@ -266,14 +277,17 @@ class Store:
         return {method: sorted(packages) for method, packages in by_method.items() if packages}
 
     def _packages(self) -> Iterator[tuple[str, dict[str, str], dict[str, str]]]:
-        """Yield the packages that a method's file imports, for each environment of stored runs.
+        """Yield the packages that a method's file imports, for methods with runs in the plan.
+
+        There is an item for each combination of a method and of the versions of packages with which
+        some of its runs were made.
 
         Yields
         ------
         str
             Id of the method.
         dict
-            Dict that maps the name of each package to the version with which the runs were made.
+            Dict that maps the name of each package to the version with which these runs were made.
         dict
             Dict that maps the name of each package to its version in the last ``coartic run``.
         """
@@ -295,19 +309,26 @@ class Store:
         return int(self._rows(query)[0][0])
 
     def ids(self, prefix: str = "") -> list[str]:
-        """Return the ids of all runs in the folder that begin with ``prefix``."""
+        """Return the ids of stored runs that begin with ``prefix``.
+
+        Runs outside the plan are included.
+        """
         query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
         return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
     def solved(self) -> dict[str, list[str]]:
-        """Return a dict that maps ids of cells to ids of runs with status ``ok``."""
+        """Return a dict that maps ids of cells to lists of the ids of solved runs.
+
+        A solved run has status ``ok``. Cells and runs outside the plan are included; cells without
+        solved runs are left out.
+        """
         by_cell = defaultdict[str, list[str]](list)
         for cell, run_id in self._rows("SELECT cell, run_id FROM results WHERE status = 'ok'"):
             by_cell[cell].append(run_id)
         return dict(by_cell)
 
     def results(self) -> dict[str, str]:
-        """Return a dict that maps ids of all stored runs to hashes of their outcomes."""
+        """Return a dict that maps the id of each stored run to its column ``result``."""
         return dict(self._rows("SELECT run_id, result FROM results"))
 
     # Writing and reading runs.
@@ -315,8 +336,9 @@ class Store:
     def write(self, runs: Iterable[Row]) -> None:
         """Write finished runs, all of them or none.
 
-        The runs replace stored runs with the same cell, seed and number. Raises CoarticError if the
-        runs cannot be stored, for example because the disk is full.
+        Stored runs with the same ids are replaced. The cells of the runs must be stored already
+        (:meth:`replace_plan`). Raises CoarticError if the runs cannot be stored, for example
+        because the disk is full.
         """
         with self.transaction():
             for run in runs:
@@ -344,9 +366,10 @@ class Store:
             raise CoarticError(f"{plain(str(self.folder / RUNS_FILE))} cannot be used: {_DAMAGED}")
 
     def include(self, other: Store) -> None:
-        """Copy from another folder the runs that this folder lacks.
+        """Copy the runs that this folder lacks from another folder.
 
-        Only runs of cells of the plan are copied.
+        Only runs of cells that are in the plan of this folder are copied. Raises CoarticError if
+        the other folder cannot be read, or this folder cannot be written.
         """
         file = f"{(other.folder / RUNS_FILE).absolute().as_uri()}?mode=ro"
         with explain_errors(other.folder):
@@ -368,11 +391,11 @@ class Store:
             self._db.execute("DETACH DATABASE other")
 
     def run(self, run_id: str) -> Row:
-        """Return a run by its id.
+        """Return the stored run with a given id.
 
-        Attribute ``suite`` of its job and attribute ``where`` of its method are empty. Raises
-        CoarticError if the run is not stored in the folder, or if the stored run does not match the
-        id.
+        Attribute ``suite`` of its job and attribute ``where`` of its method are empty. Values of
+        columns that a file of an older format lacks are None. Raises CoarticError if the run is not
+        stored in the folder, or if the stored run does not match the id.
         """
         query = """SELECT results.*, cells.content AS cell_content, environments.content AS made
             FROM results JOIN cells ON cells.id = cell
@@ -407,12 +430,13 @@ class Store:
             )
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs``: a row for each stored run of the plan, in the order of the plan.
+        """Return view ``runs`` as a data frame.
 
         Returns
         -------
         DataFrame
-            Columns :data:`.COLUMNS`, with nullable types.
+            A row for each stored run of the plan, in the order of the plan. The columns are those
+            of :data:`.COLUMNS`, with nullable types.
         """
         there = {*self._columns("asked")}
         missing = {"world": "'' AS world", "noisy_ticks": "NULL AS noisy_ticks"}
@@ -425,13 +449,14 @@ class Store:
         return self._frame(f"SELECT {', '.join(columns)} FROM asked ORDER BY position, run")
 
     def solutions(self) -> pd.DataFrame:
-        """Return view ``solutions``: a row for each movement of the plan's solutions.
+        """Return view ``solutions`` as a data frame.
 
         Returns
         -------
         DataFrame
-            Columns ``run_id``, ``order`` (from 0), ``goal`` (from 1), ``hand``, ``kind``, ``ticks``
-            and ``path`` (configurations as JSON), with nullable types.
+            A row for each movement of each solution in the plan. The columns are ``run_id``,
+            ``order`` (from 0), ``goal`` (from 1), ``hand``, ``kind``, ``ticks`` and ``path`` (the
+            target, or the waypoints of a path, as JSON), with nullable types.
         """
         return self._frame(_SOLUTIONS)
 
@@ -441,10 +466,10 @@ class Store:
         Parameters
         ----------
         part : {"solution", "initial", "replay"}
-            Runs without this part are left out.
+            The part of the runs.
         most : int
-            Largest number of runs for each cell of the plan. Of each cell, the first runs with
-            status ``ok`` are returned.
+            Largest number of runs for each cell of the plan. For each cell, the first ``most`` runs
+            with status ``ok`` are used; those of them without the part are left out.
         """
         query = """SELECT run_id, json_extract(movements, ?) FROM
             (SELECT run_id, movements, position, run,
@@ -458,9 +483,7 @@ class Store:
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the rewards of the trials of each run of the plan.
-
-        Runs without stored rewards are left out.
+        """Yield the rewards of each run of the plan that has stored rewards.
 
         Yields
         ------
@@ -476,10 +499,12 @@ class Store:
                 yield run_id, _unpack(blob)
 
     def outdated_noise(self) -> list[list[str]]:
-        """Return the ids of runs whose ticks follow another rule of noise.
+        """Return the ids of runs without mean ticks by the present rule of motor noise.
 
-        Only runs of the plan with status ``ok`` are considered. The result contains a list of ids
-        for each cell with such runs.
+        The mean ticks are missing, or were computed by another version of the rule
+        (:data:`.NOISE_RULE`). In a world without motor noise that is not the paper's, all runs are
+        without such ticks. Only runs of the plan with status ``ok`` are considered. The result
+        contains a list of ids for each cell with such runs.
         """
         rule = "noise_rule" if "noise_rule" in self._columns("asked") else "NULL"
         query = f"""SELECT position, run_id FROM asked WHERE status = 'ok'
@@ -494,7 +519,7 @@ class Store:
         return [row[1] for row in self._rows(f"PRAGMA {schema}.table_info({table})")]
 
     def _insert(self, table: str, **row: Any) -> None:
-        """Insert a row into a table, or update the row with the same id."""
+        """Insert a row into a table, or update the row with the same id if there is one."""
         key = {"cells": "id", "environments": "id", "results": "run_id"}.get(table)
         names, marks = ", ".join(f'"{name}"' for name in row), ", ".join("?" * len(row))
         # Setting the key, even to its own value, would make SQLite check all rows that refer to it.
@@ -504,7 +529,10 @@ class Store:
         self._db.execute(statement, [*row.values()])
 
     def _rows(self, query: str, *values: object) -> list[Any]:
-        """Return the rows of a query. Raises CoarticError if the file cannot be read."""
+        """Return the rows of a query as a list of tuples.
+
+        Raises CoarticError if the file cannot be read.
+        """
         with explain_errors(self.folder):
             return [tuple(row) for row in self._db.execute(query, values)]
 
@@ -537,7 +565,10 @@ class Store:
             return pd.concat(parts, ignore_index=True)
 
     def _wait_for(self, statement: str) -> None:
-        """Execute a statement; while another program locks the file, warn once and retry."""
+        """Execute a statement, and repeat it while another program locks the file.
+
+        A warning is given after the first attempt.
+        """
         for attempt in itertools.count():
             try:
                 self._db.execute(statement)
@@ -572,9 +603,10 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
 
 
 def _cell_from(cell_id: str, content: str) -> Cell:
-    """Return a cell from its JSON. Attribute ``where`` of the cell's method is empty.
+    """Return the cell that is stored as JSON in table ``cells``.
 
-    Raises ValueError if the JSON is not a cell, or if it is a cell with another id.
+    Attribute ``where`` of the cell's method is empty. Raises ValueError if ``content`` is not the
+    JSON of a cell with the id ``cell_id``.
     """
     cell: Cell = _CELL.validate_python(json.loads(content))
     if cell.id != cell_id:
@@ -597,7 +629,8 @@ def _environment_row(content: Mapping[str, Any]) -> dict[str, Any]:
 def open_store(folder: Path) -> Iterator[Store]:
     """Open a results folder for reading, in a ``with`` block.
 
-    Raises CoarticError if the folder has no results, or results in another format.
+    Raises CoarticError if the folder has no results, or results in a format that this version
+    cannot read.
     """
     path = folder / RUNS_FILE
     with explain_errors(folder):
@@ -634,8 +667,9 @@ def open_content(content: bytes, name: str) -> Iterator[Store]:
 def open_store_for_writing(folder: Path) -> Iterator[Store]:
     """Lock a results folder, and open it for writing in a ``with`` block.
 
-    A missing folder is made. Raises CoarticError if the folder contains files but no results, if it
-    cannot be written, or if another process writes into it.
+    A missing folder is made, and a file of an older format is updated. Raises CoarticError if the
+    folder contains files but no results, if its results are in a format that this version cannot
+    read, if it cannot be written, or if another process has locked it.
     """
     path = folder / RUNS_FILE
     with explain_errors(folder):
@@ -664,8 +698,8 @@ def open_store_for_writing(folder: Path) -> Iterator[Store]:
 def lock(folder: Path, *, command: str = "coartic run") -> Iterator[None]:
     """Lock a folder for this process in a ``with`` block.
 
-    On a disk that has no locks, the block runs without a lock. Raises CoarticError, which names
-    ``command``, if another process has locked the folder.
+    On a disk that does not support locks, the block runs without a lock. If another process has
+    locked the folder, CoarticError is raised; the message says that ``command`` uses the folder.
     """
     opened = os.open(folder, os.O_RDONLY)
     try:
@@ -683,7 +717,7 @@ def lock(folder: Path, *, command: str = "coartic run") -> Iterator[None]:
 
 
 def _connect(where: str) -> sqlite3.Connection:
-    """Return a connection to a ``file:`` address or ``:memory:``."""
+    """Return a connection to a database: a ``file:`` address, or ``:memory:``."""
     connection = sqlite3.connect(where, timeout=WAIT_S, isolation_level=None, uri=True)
     connection.row_factory = sqlite3.Row
     connection.execute("PRAGMA trusted_schema = OFF")
@@ -720,7 +754,10 @@ def _has_tables(connection: sqlite3.Connection, path: Path) -> bool:
 
 
 def _add_columns(connection: sqlite3.Connection) -> None:
-    """Update a file of an older format: add columns, and replace views."""
+    """Update a file of an older format: add columns, and replace views.
+
+    A file of the present format is not changed.
+    """
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if version == FORMAT:
         return
@@ -742,9 +779,9 @@ def _add_columns(connection: sqlite3.Connection) -> None:
 def explain_errors(folder: Path) -> Iterator[None]:
     """Turn errors of a ``with`` block into a CoarticError that names the file.
 
-    - Errors of the system and of SQLite are explained.
-    - A ValueError, LookupError, TypeError or error of zlib means that coartic did not write the
-      content.
+    - For an OSError or an error of SQLite, the message says what the cause is.
+    - For a ValueError, LookupError, TypeError or error of zlib, the message says that coartic did
+      not write the content.
     - Other errors are raised as they are.
     """
     try:
@@ -772,7 +809,8 @@ _SENTENCES = {
     "size (`ulimit -f`) may be exhausted: make room, and repeat the command",
     "SQLITE_FULL": "the disk is full: make room, and repeat the command",
 }
-"""Explanation of an error by its name in SQLite, or by the first two words of that name."""
+"""Dict that maps the name of an error in SQLite, or the first two words of the name, to an
+explanation for the user."""
 
 
 def _explain(path: Path, error: Exception) -> str:
@@ -793,10 +831,10 @@ def _explain(path: Path, error: Exception) -> str:
 
 
 def _unpack(blob: bytes | None) -> Array:
-    """Decompress and decode rewards (:func:`reward_bytes`), shape ``(k,)``.
+    """Decompress and decode the rewards of k trials (:func:`reward_bytes`), shape ``(k,)``.
 
-    NaN stands for a trial that failed or whose reward is not stored. Raises zlib.error or
-    ValueError for a damaged blob.
+    NaN stands for a trial that failed or whose reward is not stored. The result is empty if
+    ``blob`` is None. Raises zlib.error or ValueError for a damaged blob.
     """
     if blob is None:
         return np.empty(0)

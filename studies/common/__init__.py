@@ -1,1 +1,1 @@
-"""Code that studies share: verdicts on claims, and the files of a study."""
+"""Code that studies share: it judges claims, and writes the files of a study."""

@@ -4,8 +4,8 @@ A claim says that a mean over tasks lies beyond a bound (:func:`mean_beyond`), o
 several means does (:func:`all_of`). :func:`judge` adjusts the p-values of all claims of a study
 together, by Holm's method. Two rules make verdicts stricter:
 
-- A claim that holds is undecided if its tests are no longer significant when the task that favours
-  the claim most is left out.
+- Each test is made a second time without the task that favours the claim most. A claim is supported
+  only if it is significant both times.
 - If the values over tasks are very skewed, the level of significance is 1 % instead of 5 %
   (:func:`level_of`).
 """
@@ -31,8 +31,8 @@ from coartic.analysis.words import p_value
 from coartic.estimates import LEVEL, MIN_TASKS, MIN_VALUES, Estimate
 
 RESAMPLES_OF_CLAIMS = 99_999
-"""Number of bootstrap samples of a test over tasks. It is large, because p-values are adjusted over
-many claims."""
+"""Number of bootstrap samples of a test over tasks. The number is large, because p-values are
+adjusted over many claims."""
 STRICT_LEVEL = 0.01
 """Level of significance of a test whose values over tasks are very skewed."""
 MAX_SKEWNESS = 2.0
@@ -56,8 +56,8 @@ def level_of(values: ArrayLike) -> float:
     Returns
     -------
     float
-        0.01 if the absolute skewness of the values exceeds 2, otherwise 0.05. The adjusted p-value
-        is compared with it.
+        0.01 if the absolute skewness of the values exceeds 2, otherwise 0.05. A test is significant
+        if its adjusted p-value is below this level.
 
     Examples
     --------
@@ -70,22 +70,30 @@ def level_of(values: ArrayLike) -> float:
 
 
 def two_sided_tests(samples: Mapping[Any, ArrayLike], resamples: int | None = None) -> pd.DataFrame:
-    """Test by two-sided bootstrap tests whether means over tasks differ from 0.
+    """Test whether means over tasks differ from 0, by two-sided bootstrap tests.
 
     Parameters
     ----------
     samples : mapping
-        Maps each name to a sample, with one value for each task, shape ``(tasks,)``.
+        Dict that maps the name of each sample to its values, one for each task, shape ``(tasks,)``.
     resamples : int, optional
         Number of bootstrap samples; by default :data:`RESAMPLES_OF_CLAIMS`.
 
     Returns
     -------
     DataFrame
-        A row for each sample, indexed by name: its ``mean``; ``p`` with all tasks, and
-        ``p_without`` the task that favours the sign of the mean most, both corrected over all
-        samples (Holm); and ``differs``, which is True if both are below :func:`level_of` the
-        sample.
+        A row for each sample, indexed by its name, with the columns
+
+        - ``mean``: the mean over tasks;
+        - ``p``: p-value of the test with all tasks;
+        - ``p_without``: p-value of the test without the task that favours the sign of the mean
+          most;
+        - ``differs``: True if both p-values are below the level of significance
+          (:func:`level_of`). If one of them is NaN, only the other is compared. If both are NaN,
+          the value is False.
+
+        Both columns of p-values are Holm-adjusted over all samples. A p-value is NaN if all tested
+        values are 0, or if there is only one value.
     """
     values = {name: np.asarray(each, dtype=np.float64) for name, each in samples.items()}
     means = [each.mean() for each in values.values()]
@@ -107,33 +115,33 @@ def two_sided_tests(samples: Mapping[Any, ArrayLike], resamples: int | None = No
 class Finding:
     """Evidence and tests of one claim.
 
-    The p-values of the tests in :attr:`tests`, :attr:`against` and :attr:`without` are not yet
-    adjusted for multiple tests.
+    The p-values of the tests in :attr:`tests`, :attr:`against` and :attr:`without` are not adjusted
+    for multiple tests; :func:`judge` adjusts them.
     """
 
     holds: bool | None
-    """True if the means lie where the claim says, otherwise False. It is None if there are too few
-    tasks to judge the claim."""
+    """True if all means lie where the claim says, otherwise False; None if there are too few tasks
+    to judge the claim."""
     evidence: str
     """Sentence with the means and their intervals, or with the reason why the claim cannot be
     judged."""
     tests: tuple[Estimate, ...] = ()
-    """Tests of the claim. All of them must be significant. A positive estimate is in the direction
-    of the claim."""
+    """Tests of the claim. All of them must be significant. A positive estimate means that the mean
+    lies where the claim says."""
     against: tuple[Estimate, ...] = ()
     """Tests of the opposite of the claim. A claim that does not hold is refuted if the adjusted
     p-value of one of these tests is below ``level``."""
     without: tuple[Estimate, ...] = ()
-    """The same tests of the claim, each without the task that favours the claim most."""
+    """The tests in :attr:`tests`, each made again without the task that favours the claim most."""
     level: float = LEVEL
     """Level of significance of the tests: the smallest :func:`level_of` of the tested values."""
 
     @property
     def opposite_p(self) -> float:
-        """Bonferroni-adjusted p-value of the opposite of the claim; NaN without a p-value.
+        """Bonferroni-adjusted p-value of the opposite of the claim.
 
-        It is the smallest p-value of the tests in ``against``, multiplied by the number of tests
-        with a p-value, but at most 1.
+        It is the smallest p-value of the tests in ``against``, multiplied by the number of these
+        tests that have a p-value, but at most 1. It is NaN if no test has a p-value.
         """
         tested = [test.p for test in self.against if not math.isnan(test.p)]
         return min(1.0, min(tested) * len(tested)) if tested else math.nan
@@ -141,20 +149,20 @@ class Finding:
     def verdict(self, p: float, opposite_p: float) -> Verdict:
         """Return the verdict on the claim.
 
-        - *supported*: the claim holds, and ``p`` is below ``level``, or is NaN because the claim
-          was counted exactly.
+        - *supported*: the claim holds, and ``p`` is below ``level`` or, because the claim has no
+          tests, is NaN.
         - *not supported*: the claim does not hold, and one of these is true: ``opposite_p`` is
-          below ``level``; the claim has no test; a test of at least five values has no p-value and
-          an estimate that is not positive, because all its values are equal.
-        - *undecided*: any other claim. A claim that holds is also undecided if one of its tests has
-          fewer than five values and no p-value.
+          below ``level``; the claim has no tests; a test of at least five values has no p-value,
+          because all values are equal to the bound.
+        - *undecided*: any other claim, for example one that holds and has a test of fewer than five
+          values without a p-value.
 
         Parameters
         ----------
         p : float
-            Adjusted p-value of the claim; NaN without a test.
+            Adjusted p-value of the claim; NaN if there is none.
         opposite_p : float
-            Adjusted p-value of the opposite of the claim; NaN without a test.
+            Adjusted p-value of the opposite of the claim; NaN if there is none.
         """
         untested = any(math.isnan(test.p) and min(test.n) < MIN_VALUES for test in self.tests)
         if self.holds is None or (self.holds and untested):
@@ -170,16 +178,16 @@ class Finding:
 
 
 def _largest_p(tests: Iterable[Estimate]) -> float:
-    """Return the largest p-value of tests that must all be significant; NaN without a p-value."""
+    """Return the largest p-value of tests; NaN if none of them has a p-value."""
     return max((test.p for test in tests if not math.isnan(test.p)), default=math.nan)
 
 
 def _tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
     """Test whether the mean over tasks exceeds a bound, with and without the largest value.
 
-    ``values`` contains one value for each task, shape ``(tasks,)``, for at least two tasks. The
-    first test uses all values, and the second test leaves out the largest value. A p-value is NaN
-    for a test of a single value.
+    ``values`` contains one value for each of at least two tasks, shape ``(tasks,)``. The first test
+    uses all values, and the second test leaves out the largest value. A p-value is NaN for a test
+    of a single value, or of values that are all equal to the bound.
     """
     by_task = np.asarray(values, dtype=np.float64)
     others = np.delete(by_task, by_task.argmax())
@@ -213,9 +221,10 @@ def mean_beyond(
           tests, if there are values for fewer than three tasks.
         - ``tests`` contains the test of the claim.
         - ``without`` contains the same test without the task that favours the claim most.
-        - ``against`` contains a test of the opposite of the claim. The test is made twice, with all
-          tasks and without the task that favours the opposite most; the test with the larger
-          p-value is kept.
+        - ``against`` contains one test of the opposite of the claim. This test is made with all
+          tasks and without the task that favours the opposite most; the one with the larger p-value
+          is returned.
+        - ``level`` is :func:`level_of` the values.
 
     Raises
     ------
@@ -223,7 +232,8 @@ def mean_beyond(
         ``side`` is unknown, ``values`` is not one-dimensional, or ``sentence`` does not have
         exactly one ``{}``.
     ValueError
-        There are values for at least three tasks, and a value or the bound is not finite.
+        A value is not a number, or there are values for at least three tasks and one of them or the
+        bound is not finite.
 
     Examples
     --------
@@ -265,9 +275,9 @@ def all_of(*findings: Finding) -> Finding:
     Returns
     -------
     Finding
-        A finding that holds if all findings hold. The tests and the evidence of all findings are
-        joined, and the level is the smallest of all levels. If a finding has too few tasks
-        (``holds`` is None), the first such finding is returned instead.
+        A finding that holds if all findings hold. It has the tests of all findings, their evidence
+        joined by semicolons, and the smallest of their levels. If ``holds`` of a finding is None
+        (too few tasks), the first such finding is returned instead.
 
     Raises
     ------
@@ -301,14 +311,15 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     Parameters
     ----------
     claims : mapping of str to (str, str, Finding)
-        Maps the id of each claim to its statement, its test in words, and its finding. Claims
-        without a p-value are included in the number of tests for which p-values are adjusted.
+        Dict that maps the id of each claim to a tuple: its statement, a description of its test,
+        and its finding. P-values are adjusted for the number of all claims, including claims
+        without a p-value.
 
     Returns
     -------
     DataFrame
         A row for each claim, indexed by its id, with the columns ``statement``, ``verdict``,
-        ``evidence``, ``test`` and three adjusted p-values (NaN without a test):
+        ``evidence``, ``test`` and three adjusted p-values, which are NaN for a claim without them:
 
         - ``p_holm``: p-value of the claim;
         - ``p_without``: p-value of the claim with all tasks, or without the task that favours the
@@ -351,24 +362,25 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
 
 
 def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
-    """Judge claims whose words and bounds are in a TOML file (:func:`judge`).
+    """Judge claims whose statements and bounds are in a TOML file (:func:`judge`).
 
     Parameters
     ----------
     words : str or pathlib.Path
-        TOML file with a table for each claim, named by the id of the claim. It has
+        TOML file with a table for each claim. The name of the table is the id of the claim. The
+        table has the keys
 
-        - ``text``: the claim;
-        - ``test``: the test in words;
+        - ``text``: statement of the claim;
+        - ``test``: description of the test;
         - ``means``: a list of tables, one for each mean. Such a table has a ``sentence``
           (:func:`mean_beyond`) and one bound: ``above`` if the mean is claimed to lie above the
           bound, ``below`` if it is claimed to lie below, or ``within`` if its absolute value is
           claimed to lie below.
     values : mapping of str to sequence
-        Maps the id of each claim to a list with an entry for each of its means. An entry is an
-        array with one value for each task, or a dict that maps names of groups of tasks to such
-        arrays. With groups, the mean of each group must lie beyond the bound, and the sentence may
-        contain ``{group}`` for the name of the group.
+        Dict that maps the id of each claim to a list with an entry for each of its means. An entry
+        is an array with one value for each task, or a dict that maps names of groups of tasks to
+        such arrays. With groups, the mean of each group must lie where the claim says, and
+        ``{group}`` in the sentence is replaced by the name of the group.
 
     Returns
     -------
@@ -379,7 +391,12 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
     ------
     CoarticError
         The file lacks a claim of ``values``, a claim has no ``text``, ``test`` or ``means``, or the
-        file and ``values`` have different numbers of means for a claim.
+        file and ``values`` have different numbers of means for a claim. The errors of
+        :func:`mean_beyond` are raised, too.
+    FileNotFoundError
+        The file does not exist.
+    tomllib.TOMLDecodeError
+        The file is not TOML.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Write a study's tables and page, and a suite of its missing control runs."""
+"""Write the tables and the page of a study, and a suite of its missing control runs."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from coartic.analysis.study import solved
 from coartic.analysis.words import listed, p_value
 
 PAGE = "README.md.jinja"
-"""Name of the template of a study's page."""
+"""File name of the template of a study's page."""
 _OF_RUN = [
     *("run_id", "task", "method", "setting", "run", "seed", "status", "trials", "reward", "hands"),
     *("replay_reward", "replay_hands", "initial_reward", "corrective_best", "best_known"),
 ]
-"""Columns of runs that are stored with a study."""
+"""Columns of ``study.runs`` that are stored with a study."""
 
 
 def tabulate_runs(study: Study) -> pd.DataFrame:
@@ -37,10 +37,11 @@ def tabulate_runs(study: Study) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each run, indexed by its id: task, method, seed, rewards (negative ticks), hands,
-        and the signatures of the solution (``first``, ``arm``, ...). If at least one run has a
-        replay, which is a trial without noise after learning, the frame also has the signatures of
-        replays (``replay_first``, ...). Columns without a value are left out.
+        A row for each run, indexed by its id, with columns for the task, the method and its
+        setting, the number and the seed of the run, its status, trials, rewards (negative ticks)
+        and hands, and the signatures of the solution (``first``, ``arm``, ...). If at least one run
+        has a replay, which is a trial without noise after learning, there are also columns for the
+        signatures of replays (``replay_first``, ...). Columns without a value are left out.
     """
     runs = study.runs[_OF_RUN].assign(
         **{each.column: study.signature(name) for name, each in SIGNATURES.items()}
@@ -55,26 +56,27 @@ def tabulate_runs(study: Study) -> pd.DataFrame:
 def write_study(
     folder: str | Path, tables: dict[str, pd.DataFrame], draw: Callable[[pd.DataFrame], Any]
 ) -> None:
-    """Write tables, figure and page of a study into its folder.
+    """Write the tables, the figure and the page of a study into its folder.
 
     Parameters
     ----------
     folder : str or pathlib.Path
         The study's folder, which must have a template ``README.md.jinja``. The page ``README.md``
-        is made from this template and from all CSV files of the folder (:func:`fill_page`). In the
-        template, a CSV file is a table with the name of the file.
+        is made from this template and from all files ``*.csv`` of the folder (:func:`fill_page`).
+        The name of a file without ``.csv`` is the name of its table in the template.
     tables : dict of str to DataFrame
-        Maps the name of each table to the table. Each table is written into a file of its name,
-        such as ``results.csv``. Table ``runs`` is compressed into ``runs.csv.xz``, which the page
-        does not read. Other CSV files of the folder are kept.
+        Dict that maps the name of each table to the table. Each table is written into a file with
+        its name, such as ``results.csv``. Table ``runs`` is compressed into ``runs.csv.xz``, which
+        the page does not read. Other CSV files of the folder are kept.
     draw : callable
-        Function that draws the figure, written as ``figure.svg``. Its argument is table
-        ``results``, as read from its file, and it returns a Matplotlib figure.
+        Function that returns a Matplotlib figure, which is written as ``figure.svg``. Its argument
+        is the table ``results``, as read from its file.
 
     Raises
     ------
     CoarticError
-        The folder has no template, or neither the folder nor ``tables`` has ``results``.
+        The folder has no template, or neither the folder nor ``tables`` has a table ``results``.
+        The errors of :func:`fill_page` are raised, too.
 
     Examples
     --------
@@ -129,10 +131,11 @@ def fill_page(template: str | Path, **values: Any) -> str:
     template : str or pathlib.Path
         File of the template. In the template you can
 
-        - call ``interval(row, column, digits, scale)``, which writes ``7.8 [7.3, 8.1]``
-          (:func:`coartic.analysis.interval`);
-        - call ``expect(holds, what)``, which stops if a condition is false (:func:`expect`);
-        - use the filters ``number``, ``p_value`` and ``listed``;
+        - call ``interval(row, column, digits, scale)``, which returns a string such as
+          ``7.8 [7.3, 8.1]`` (:func:`coartic.analysis.interval`);
+        - call ``expect(holds, what)``, which raises ValueError if a condition is false
+          (:func:`expect`);
+        - use the filters ``number``, ``p_value`` and ``listed`` of :mod:`coartic.analysis.words`;
         - include templates of the same folder.
     **values
         Tables, numbers and functions. The name of each argument is its name in the template.
@@ -145,8 +148,8 @@ def fill_page(template: str | Path, **values: Any) -> str:
     Raises
     ------
     CoarticError
-        The template does not exist, or ``interval`` or ``number`` gets a wrong argument, such as a
-        row without the numbers.
+        The template does not exist, or ``interval`` or ``number`` gets a wrong argument. For
+        example, the row lacks one of the numbers of the interval.
     ValueError
         A condition of ``expect`` is false, or ``listed`` gets no words.
     jinja2.TemplateError
@@ -168,12 +171,12 @@ def fill_page(template: str | Path, **values: Any) -> str:
 
 
 def expect(holds: bool, what: str) -> str:
-    """Stop making a page if one of its sentences is no longer true.
+    """Raise ValueError if a condition on which a page relies is false.
 
     Parameters
     ----------
     holds : bool
-        The condition under which the sentence is true.
+        The condition.
     what : str
         The condition in words, for the error message.
 
@@ -193,13 +196,13 @@ def expect(holds: bool, what: str) -> str:
 
 
 def control_suite(study: Study, *, runs: int = 20) -> str:
-    """Return a suite of random search that a study needs as control of signatures.
+    """Return a suite of the random search that a study lacks as control of signatures.
 
-    For each method that can select its solution from trials, and each task, the suite contains a
-    block for each hand sequence that occurs in at least a tenth of the method's solved runs. In
-    this block, random search uses this hand sequence and makes as many trials as the method, and
-    adds noise to the idle arm if the method does so. Controls that already exist in the study are
-    left out. The control of the signature ``hand``, which is random search that tries all hand
+    The suite contains a block for each method that can select its solution from trials, each task,
+    and each hand sequence that occurs in at least a tenth of the method's solved runs on the task.
+    In this block, random search uses the hand sequence, makes as many trials as the method, and
+    adds noise to the idle arm if the method does so. Blocks whose runs the study already contains
+    are left out. The control of the signature ``hand``, which is random search that tries all hand
     sequences, is not in the suite.
 
     Parameters

@@ -3,8 +3,8 @@
     python studies/dial/protocols.py results/dial
     PYTHONPATH=studies python studies/dial/study.py results/dial
 
-The *gain* of a run is the share that it covers of the distance from the reward of the corrective
-process alone, with its best hands, to the best known reward.
+The *gain* of a run is a share in per cent: 0 is the reward of the corrective process alone with its
+best hands, and 100 is the best known reward.
 """
 
 import sys
@@ -25,9 +25,12 @@ HERE = Path(__file__).parent
 def measure_runs(raw):
     """Add gains and logarithms of numbers of trials to the stored runs.
 
-    ``gain_N`` is the gain after N trials, in per cent. It is NaN on tasks on which nothing can be
-    gained. ``log_quarter`` and ``log_half`` are logarithms (base 10) of the numbers of trials to a
-    quarter and to half of the gain. For a run that does not get there, all trials count.
+    - ``gain_N`` is the gain after N trials, in per cent.
+    - ``log_quarter`` and ``log_half`` are the logarithms (base 10) of the numbers of trials until
+      the gain is 25 % and 50 %. For a run of 10,000 trials that does not reach this gain, they are
+      the logarithm of 10,000. For such a run of fewer trials, they are NaN.
+
+    All of them are NaN on tasks on which nothing can be gained.
     """
     zero = raw.corrective_best
     possible = (raw.best_known - zero).where(raw.best_known > zero)
@@ -38,10 +41,12 @@ def measure_runs(raw):
 
 
 def tabulate(runs):
-    """Tabulate mean gains and median numbers of trials to a quarter and to half of the gain.
+    """Tabulate mean gains, and median numbers of trials to gains of 25 % and 50 %.
 
-    Means of gains are over random tasks, which all have the same weight, or over the runs on a task
-    of the paper.
+    The rows are for all random tasks, for each family, and for each task of the paper, each with
+    every setting. Means of gains are over random tasks, which all have the same weight, or over the
+    runs on a task of the paper. A median is over runs; it is infinite if half of the runs do not
+    reach the gain.
     """
     drawn = runs[runs.family.isin(FAMILIES)]
     every = pd.concat([drawn.assign(group="random"), runs.assign(group=runs.family)])
@@ -98,14 +103,15 @@ DIRECTIONS = {
     "next goal (σ = 0.01)": ("0.01", "next-goal"), "next goal": ("0.05", "next-goal"),
     "present posture": ("0.05", "stay"), "start": ("0.05", "start"),
 }  # fmt: skip
-"""What exploration leans towards, with the noise and the direction of the settings of each line."""
+"""Dict that maps the label of each line of the figure, which says towards what exploration leans,
+to the noise and the direction in the names of its settings."""
 OTHERS = "CMA-ES", "posture planning", "shortest path"
 """Methods that the figure shows as horizontal lines."""
 
 
 @figures.styled
 def draw(table):
-    """Draw the mean gain after 100 trials on random tasks by drift, and that of other methods."""
+    """Draw the mean gain after 100 trials on random tasks, by drift and for other methods."""
     figure, (axes,) = figures.panels((1, 1), (figures.TWO, 3.4))
     rows = table[table.group == "random"].set_index("setting")
     kappas = [0, *DRIFTS]

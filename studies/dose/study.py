@@ -31,15 +31,17 @@ SHARED = ("ascending", "descending")
 def measure_runs(study):
     """Return the solved runs with their measures.
 
-    A learner's run is measured by its noiseless trial after learning (the replay), a run of random
-    search by its solution. Columns:
+    A learner's run is measured by its noiseless trial after learning (the replay), and a run of
+    random search by its solution. Runs of random search with other settings than the defaults are
+    left out; they are used only for ``beyond``. The new columns are
 
     - ``nearer``, ``first``, ``saved``: see :data:`MEASURES`;
     - ``beyond``: ``nearer`` less its mean in random search on the same task with the same hands;
+      missing for random search;
     - ``group``: the family, or the task of the paper;
-    - ``counted``: the movements whose rewards count;
-    - ``dose``: the factor γ;
-    - ``kind``: ``counted`` and ``dose`` in words.
+    - ``counted``: the movements whose rewards count (``all`` or ``later``), or ``random search``;
+    - ``dose``: the factor γ; missing for random search;
+    - ``kind``: ``counted`` and ``dose`` as a string.
     """
     learns = study.runs.method != RANDOM_SEARCH
     nearer, first = (
@@ -64,7 +66,10 @@ def measure_runs(study):
 
 
 def tabulate(study, runs):
-    """Tabulate means by γ over random tasks, or over the runs on a task of the paper."""
+    """Tabulate the mean measures by γ.
+
+    Means are over random tasks, or over the runs on a task of the paper.
+    """
     every = pd.concat([runs[runs.family.notna()].assign(group="random"), runs])
     every["row"] = every.group + " " + every.kind
     # All random tasks have the same weight, whatever their number of runs.
@@ -78,7 +83,9 @@ def tabulate(study, runs):
 
 
 def tabulate_posture_difference(study, runs):
-    """Tabulate the posture difference at the goal that two tasks of the paper share, by γ.
+    """Tabulate by γ the posture difference at the goal that two tasks share.
+
+    The tasks are those of the paper in :data:`SHARED`.
 
     The posture difference mixes length units and rad. ``beyond_p`` is p of a test against the
     posture difference of random search.
@@ -129,7 +136,7 @@ LOOKS = {
 
 @figures.styled
 def draw(table):
-    """Draw the measures by γ on random tasks, and the posture difference on the paper's tasks."""
+    """Draw measures by γ on random tasks, and the posture difference on the paper's tasks."""
     figure, panels = figures.panels((2, 2), (figures.TWO, 4.6))
     shown = [name for name in MEASURES if name != "nearer"]
     for axes, name in zip(panels, [*shown, "posture_difference"], strict=True):

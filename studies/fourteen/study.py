@@ -39,7 +39,7 @@ def measure_plans(study):
     """Return the plans with the gains of their goals ahead.
 
     There is a row for each task, number of ``nodes`` and horizon h. With h goals ahead instead of
-    h - 1, the planner sees more only at n - h of the n movements. Columns:
+    h - 1, the planner sees one goal more at n - h of the n movements. The new columns are
 
     - ``gain``: ticks that the last goal ahead saves for each of these movements, as a share of the
       mean movement of the best known solution;
@@ -66,17 +66,18 @@ def measure_plans(study):
 def first_plans(plans):
     """Return the plans that were made first, without repeats and tasks that were added later.
 
-    They have the tasks and the numbers of nodes of the plans without a goal ahead.
+    The plans without a goal ahead were all made first. The other first plans have the same tasks
+    and the same numbers of nodes.
     """
     first = plans[plans.horizon == 0]
     return plans[plans.task.isin(first.task) & plans.nodes.isin(first.nodes)]
 
 
 def repeats_of(plans):
-    """Return the ticks with three and with four goals ahead, for tasks with two arms.
+    """Return the ticks with three and with four goals ahead.
 
-    There is a row for each task and number of ``nodes``, with the ticks in ``three`` and ``four``,
-    and the ``gain`` of the fourth goal.
+    There is a row for each task with fourteen goals and two arms, and each number of ``nodes``. The
+    ticks are in columns ``three`` and ``four``, and the gain of the fourth goal is in ``gain``.
     """
     plans = plans[(plans.family == MANY[1]) & (plans.horizon == 4) & (plans.before_horizon == 3)]
     plans = plans.sort_values(["task", "nodes"]).rename(columns={"ticks": "four"})
@@ -86,7 +87,10 @@ def repeats_of(plans):
 
 
 def tabulate(study, plans):
-    """Tabulate gaps and gains by goals ahead, then the gaps of other methods, all as shares."""
+    """Tabulate gaps and gains by goals ahead, and the gaps of other methods.
+
+    All are shares, not per cent.
+    """
     plans = plans.sort_values(["family", "horizon"], kind="stable")
     planned = means(plans, ["family", "method", "horizon"], ["gap", "gain", "together"])
     planned = planned.rename(columns={"horizon": "h", "rows": "tasks"})
@@ -110,7 +114,7 @@ def tabulate_others(study):
 
 
 def at(plans, families, h, column):
-    """Return a column of the plans with h goals ahead, in per cent, by task."""
+    """Return a column of the plans with h goals ahead, in per cent, indexed by task."""
     rows = plans[plans.family.isin(families) & (plans.horizon == h)]
     return 100 * rows.set_index("task")[column]
 
@@ -118,8 +122,8 @@ def at(plans, families, h, column):
 def signed_rank(gains, side="greater"):
     """Return p of a one-tailed signed-rank test of gains against :data:`GAIN`.
 
-    ``gains`` has a gain in per cent for each task. ``side`` says whether the test is that they are
-    greater or less.
+    ``gains`` contains a gain in per cent for each task. ``side`` is the alternative hypothesis: the
+    gains are ``"greater"`` or ``"less"``.
     """
     return stats.wilcoxon(gains - GAIN, alternative=side).pvalue
 
@@ -127,9 +131,9 @@ def signed_rank(gains, side="greater"):
 def tabulate_fourth(repeats):
     """Tabulate the gain of the fourth goal ahead with two arms.
 
-    Rows are for all tasks, for all tasks without the greatest gains, for the first tasks, for the
-    tasks that were added later, and for each repeat. p is that of the test that the mean gain
-    exceeds 1 %.
+    Rows are for all tasks, for all tasks without those with the greatest gains (one or five), for
+    the first tasks, for the tasks that were added later, and for each repeat. ``p`` is the p-value
+    of the test that the mean gain exceeds 1 %; ``signed_rank_p`` is that of :func:`signed_rank`.
     """
     repeats = repeats.assign(gain=100 * repeats.gain)
     gains = repeats.groupby("task").gain.mean()
@@ -188,7 +192,7 @@ def judge_claims(study, plans, repeats):
 
 @figures.styled
 def draw(table):
-    """Draw the sum of the gains of goals ahead, by their number, for up to four goals ahead.
+    """Draw the sum of the gains of all goals ahead, for up to four goals ahead.
 
     From three goals ahead, a dashed line rises by :data:`GAIN` for the fourth.
     """

@@ -28,8 +28,8 @@ STEPS = ["0", "1", "2", "3", "4", "5+", "all"]
 def measure_plans(study):
     """Return the plans on random tasks with their signatures.
 
-    ``ahead`` is the number of goals ahead at the first movement, and ``h`` the number of them that
-    the planner sees.
+    Column ``ahead`` is the number of goals ahead at the first movement, and ``h`` is the number of
+    goals ahead that the planner sees there.
     """
     plans = study.runs[(study.runs.method == PLANNER) & study.runs.family.notna()]
     return plans.assign(
@@ -40,10 +40,12 @@ def measure_plans(study):
 
 
 def average(plans):
-    """Return means over the repeats of a plan, with a row for each task and step.
+    """Return means over the repeats of each plan, by task and step (:data:`STEPS`).
 
-    Gaps are shares. ``gain`` is the gain of the last goal in view. ``ahead`` is the number of goals
-    ahead at the first movement.
+    Gaps are shares. ``gain`` is by how much the gap is smaller than with one goal ahead less. With
+    more than five goals ahead, it is by how much it is smaller than with four. ``gain`` is NaN
+    without a goal ahead, and in step ``all``. ``ahead`` is the number of goals ahead at the first
+    movement.
     """
     keys = ["task", "family", "goals", "ahead", "h"]
     plans = plans.groupby(keys, sort=False)[["gap", *SIGNATURES]].mean().reset_index()
@@ -56,7 +58,7 @@ def average(plans):
 
 
 def tabulate(plans):
-    """Tabulate gaps and gains by goals ahead, over all tasks and by the number of goals."""
+    """Tabulate gaps and gains by goals ahead, for all tasks and each number of goals."""
     count = plans.goals.map(lambda goals: str(goals) if goals <= 5 else "6 or more")
     by_goals = plans.assign(group="goals", value=count).sort_values("value", kind="stable")
     every = pd.concat([plans.assign(group="all", value="all"), by_goals])
@@ -66,10 +68,10 @@ def tabulate(plans):
 
 
 def tabulate_movements(gains):
-    """Tabulate the gain of the last goal in view, for each movement that has it ahead.
+    """Tabulate the gain of the last goal in view per movement, for one to four goals ahead.
 
-    The gain is in per cent of a movement. Rows are for all tasks that have this goal, for each
-    number of goals, and for tasks with five goals or more.
+    The gain is in per cent of a movement, for each movement that has this goal ahead. Rows are for
+    all tasks that have this goal, for each number of goals, and for tasks with five or more goals.
     """
     h = gains.h[(gains.h > 0) & (gains.h <= 4)].astype(int)
     gain = 100 * gains.gain * gains.goals / (gains.goals - h)

@@ -29,12 +29,12 @@ from common.writing import write_study
 HERE = Path(__file__).parent
 FINDINGS = tomllib.loads((HERE / "human.toml").read_text("utf-8"))
 GROUPS, MODELS, FURTHER = (FINDINGS.pop(key) for key in ("groups", "models", "further"))
-"""Findings by id, in the order of the table; groups of models by name; and models by name, as
-methods with their parameters: those that are compared with people, and further ones that measures
-need."""
+"""``FINDINGS`` maps ids to findings, in the order of the table. ``GROUPS`` maps names to groups of
+models. ``MODELS`` and ``FURTHER`` map names to models, which are methods with their parameters:
+``MODELS`` are compared with people, and ``FURTHER`` are needed for measures."""
 SEARCH = "random search"
 OF_TWO_ARMS = {"first movement against isolated reach", "near-tie repeats"}
-"""Measures on tasks for two arms, where random search can have other hands than a model."""
+"""Measures on tasks for two arms, where random search can use other hands than a model."""
 LEVEL, RESAMPLES = 0.05, 9_999
 VALUE_KEYS = ["measure", "model", "sample", "task"]
 NOT_BEYOND = "it is not shown to exceed random search"
@@ -47,22 +47,24 @@ EFFECTS_WITH_POWER = {
     "serial-where-it-may learner benefit correlation": "value",
     "bends-away learner bow slope": "value",
 }
-"""Effects for which power is computed (:func:`tabulate_power`), with the column that is tested."""
+"""Dict that maps each effect for which power is computed (:func:`tabulate_power`) to the column
+that is tested."""
 COLORS = {"agrees": figures.PALETTE[0], "undecided": "#d0d0d0", "disagrees": figures.PALETTE[3]}
 MARKS = {"agrees": "+", "disagrees": "−", "undecided": "?", "silent": "·", "no cases": "·"}
 
 
 def tidy(study):
-    """Return the solved runs of all models, in the order of the suite, with a row for each run.
+    """Return the solved runs of all models, in the order of the suite.
 
-    Columns:
+    There is a row for each run and model. The columns are
 
-    - ``model``;
-    - ``task``, with the number of its ``arms`` and ``goals``, and the ``best`` reward of any run;
-    - ``origin``: the task without a moved goal; ``moved``: the number of the goal that was moved
-      (0 for none); ``place``: its new y (in length units);
-    - ``horizon`` of a planner;
-    - ``hands``; ``path``: the movement tick by tick.
+    - ``model``: name of the model;
+    - ``task``: name of the task; ``arms``, ``goals``: numbers of its arms and goals; ``best``: the
+      highest reward of any run on it;
+    - ``origin``: name of the task without a moved goal; ``moved``: number of the goal that was
+      moved (0 for none); ``place``: y of this goal (in length units);
+    - ``horizon``: parameter of a planner; None for other methods;
+    - ``hands``: hand sequence; ``path``: the trajectory (:func:`coartic.trajectory`).
     """
     solved = study.runs[study.runs.status == "ok"]
     best = solved.groupby("task").reward.max()
@@ -85,9 +87,9 @@ def tidy(study):
 
 
 def models_of(task, method, parameters):
-    """Return the names of the models for which a method with its parameters stands on a task.
+    """Return the names of the models that a method with its parameters represents on a task.
 
-    ``parameters`` has all parameters of the method, including defaults.
+    ``parameters`` contains all parameters of the method, including defaults.
     """
     learner = f"dual-process/EC{4 if len(task.hands) > 1 else 1}"
     given = parameters | {"hands": parameters.get("hands") or ""}
@@ -100,10 +102,10 @@ def models_of(task, method, parameters):
 
 
 def of_control(runs, model, measure):
-    """Return a measure on tasks for two arms for the control of a model, by task.
+    """Return a measure of a model's control on tasks for two arms, by task.
 
-    The control is random search with the hands of each of the model's runs. For the choice of
-    hands, it is random search with every hand sequence.
+    The control is random search with the hands of each of the model's runs. For measure
+    ``near-tie repeats``, it is random search with every hand sequence.
     """
     if measure == "near-tie repeats":
         return MEASURES[measure][0](runs, "random search, every hand sequence")
@@ -116,13 +118,14 @@ def of_control(runs, model, measure):
 def measure_effects(study):
     """Return the effects (:func:`tabulate_effects`), and the values from which they are computed.
 
-    The values are by measure, model and task. Column ``sample`` is ``model`` or ``control``.
+    The table of values has a row for each value, with its measure, model, sample (``model`` or
+    ``control``) and task.
     """
     runs, used = tidy(study), {}
     of_model = cache(lambda measure, model: MEASURES[measure][0](runs, model))
 
     def measured(measure, model):
-        """Return the values of a model and of its control, by task."""
+        """Return the values of a model, and those of its control, by task."""
         control = of_model(measure, SEARCH)
         if model != SEARCH and measure in OF_TWO_ARMS:
             control = of_control(runs, model, measure)
@@ -137,14 +140,15 @@ def measure_effects(study):
 
 
 def tabulate_effects(findings, judge):
-    """Return the effects, with a row for each finding, model and test, in their order.
+    """Return the effects: a row for each finding, model and test, in this order.
 
-    ``judge`` is a function of model, test, level and a reason why the model is silent (or empty).
-    It returns the columns of a test. The columns of the effects are
+    ``judge`` is a function with the arguments model, test, level, and the reason why the model is
+    silent (empty if it is not). It returns the columns of a test as a dict. The columns of the
+    effects are, among others,
 
-    - ``value`` with its interval, and the number of ``tasks``;
+    - ``value``: value of the measure, with its interval; ``tasks``: number of tasks;
     - ``over_random_search``: by how much the value exceeds that of random search;
-    - ``of_test``: the verdict of the test; ``verdict``: the verdict of the finding;
+    - ``of_test``: verdict of the test; ``verdict``: verdict of the finding;
     - ``built_in``: True if the verdict follows from how the model is built;
     - ``because``: why a model is silent, or why it does not agree although its interval is beyond
       the bound.
@@ -167,9 +171,9 @@ def tabulate_effects(findings, judge):
 
 
 def by_model(words):
-    """Return words by model.
+    """Return a dict that maps models to texts.
 
-    ``words`` has them by model, or by group of models (:data:`GROUPS`).
+    ``words`` maps models, or groups of models (:data:`GROUPS`), to texts.
     """
     return {model: text for name, text in words.items() for model in GROUPS.get(name, [name])}
 
@@ -177,9 +181,9 @@ def by_model(words):
 def judge_test(measured, model, test, level, silent):
     """Apply one test of a finding to a model, and return the columns of the test.
 
-    ``measured`` is a function of a measure and a model that returns the values of the model and of
-    its control. ``level`` is 1 less the coverage of the interval. ``silent`` says why nothing
-    follows for the model, or is empty.
+    ``measured`` is a function with the arguments measure and model. It returns the values of the
+    model and of its control. ``level`` is 1 minus the coverage of the interval. ``silent`` is the
+    reason why nothing follows for the model, or the empty string.
     """
     statistic = MEASURES[test["measure"]][1]
     values, control = (pd.Series(), pd.Series()) if silent else measured(test["measure"], model)
@@ -204,8 +208,9 @@ def decide(test, seen, over, tasks, silent):
     """Return the verdict of a test, and why a model is silent or does not agree.
 
     The rule is the same for all models. A model agrees if its interval lies beyond the bound, and
-    if its value exceeds that of random search where this is measured. ``over`` is this excess with
-    its interval. ``silent`` says why nothing follows for the model, or is empty.
+    if its value exceeds that of random search where this is measured. With fewer than ten tasks the
+    test is undecided. ``seen`` is the value, and ``over`` is this excess, both with their
+    intervals. ``silent`` is the reason why nothing follows for the model, or the empty string.
     """
     side, word = (1, "above") if "above" in test else (-1, "below")
     near, far = sorted([side * seen.low, side * seen.high])
@@ -220,10 +225,11 @@ def decide(test, seen, over, tasks, silent):
 
 
 def bootstrap(sides, statistic, level):
-    """Return a statistic of all tasks with its interval for other tasks, and the number of tasks.
+    """Return an estimate: a statistic of all tasks, with its interval for other tasks.
 
-    ``sides`` has values by task. With two sides, the result is the statistic of the first less that
-    of the second, on the tasks that both have. ``level`` is 1 less the coverage of the interval.
+    ``sides`` is a list of one or two tables of values, indexed by task. With two tables, the result
+    is the statistic of the first minus that of the second, on the tasks that both contain.
+    ``level`` is 1 minus the coverage of the interval.
 
     The ends of the interval are percentiles of resamples of tasks. The interval is widened by
     √(k / (k − 1)) for k tasks, because resamples underestimate the spread by this factor. The value
@@ -236,10 +242,10 @@ def bootstrap(sides, statistic, level):
 
 
 def resampled(sides, statistic):
-    """Return a statistic of all tasks, the number k of tasks, and the statistic of resamples.
+    """Return a statistic of all tasks, the number k of tasks, and resampled statistics.
 
-    The distances of resampled statistics from the first are multiplied by √(k / (k − 1)). There are
-    no resamples with fewer than two tasks (:func:`bootstrap`).
+    The distances of the resampled statistics from the statistic of all tasks are multiplied by
+    √(k / (k − 1)). With fewer than two tasks there are no resamples (:func:`bootstrap`).
     """
     tasks = [task for task in sides[0].index.unique() if all(task in side.index for side in sides)]
     rows = [[pd.DataFrame(side).loc[[task]].to_numpy() for task in tasks] for side in sides]
@@ -261,8 +267,8 @@ def resampled(sides, statistic):
 def verdict_of(tests):
     """Return the verdict of a finding from the verdicts of its tests.
 
-    It is the verdict of the tests if all are the same; otherwise ``disagrees`` if a test has this
-    verdict; otherwise ``no cases`` if a test has this verdict; otherwise ``undecided``.
+    If all tests have the same verdict, it is this verdict. Otherwise it is ``disagrees`` if a test
+    has this verdict, or else ``no cases`` if a test has this verdict, or else ``undecided``.
     """
     if len(set(tests)) == 1:
         return tests[0]
@@ -272,7 +278,7 @@ def verdict_of(tests):
 def p_of_side(values, bound, side):
     """Return the two-sided p of the test that a statistic lies beyond a bound.
 
-    ``side`` is 1 for above and -1 for below. ``values`` has the statistic of resamples.
+    ``side`` is 1 for above and -1 for below. ``values`` contains the resampled statistics.
     """
     return min(1.0, 2 * (1 + (side * (values - bound) <= 0).sum()) / (1 + len(values)))
 
@@ -280,8 +286,9 @@ def p_of_side(values, bound, side):
 def p_of_test(row, test, values):
     """Return p of the verdict of a test.
 
-    Agreement needs two tests: beyond the bound, and beyond random search. Its p is the larger one.
-    ``row`` is the effect, and ``values`` has a frame by task for ``model`` and for ``control``.
+    Agreement needs two tests: that the value is beyond the bound, and that it exceeds random
+    search. Its p is the larger of the two. ``row`` is the row of the effect, and ``values`` maps
+    ``model`` and ``control`` to tables of values, indexed by task.
     """
     side, word = (1, "above") if "above" in test else (-1, "below")
     if row.finding == "body-shares":  # only its intervals are stored
@@ -304,8 +311,9 @@ def p_of_test(row, test, values):
 def correct(effects, values):
     """Return the verdicts of models on findings, corrected over all verdicts (Holm).
 
-    There is a row for each pair of finding and model, with ``tasks``, the ``uncorrected`` verdict
-    and its ``p``, ``p_holm`` and the corrected ``verdict``. Tests of one finding are corrected by
+    There is a row for each pair of a finding and a model. Its columns are, among others, ``tasks``,
+    the ``uncorrected`` verdict, its p-value (``p``), the Holm-adjusted p-value (``p_holm``), and
+    the corrected ``verdict``. Tests of one finding are corrected by
     Bonferroni, as their intervals are. Verdicts that follow from how a model is built are not
     changed. ``values`` is table ``runs``.
     """
@@ -352,8 +360,8 @@ def tabulate(verdicts):
 def separating(table):
     """Return the rows of table ``results`` that separate models.
 
-    In these rows a verdict is decided that does not follow from how its model is built, and not all
-    models have this verdict.
+    In such a row, the verdicts of the models differ, and at least one of them is ``agrees`` or
+    ``disagrees`` and does not follow from how its model is built.
     """
     models = table.drop(columns="finding")
     decided = models.isin(["agrees", "disagrees"]).any(axis=1)
@@ -363,7 +371,7 @@ def separating(table):
 
 @figures.styled
 def draw(table):
-    """Draw for each model how many findings have which verdict, and the rows that separate models.
+    """Draw the number of findings by model and verdict, and the rows that separate models.
 
     Bars of findings with which a model disagrees go to the left. Marks of verdicts that follow from
     how the model is built are in brackets.
@@ -420,12 +428,15 @@ def judge_all(effects, values):
 
 
 def tabulate_power(effects, judged):
-    """Return the smallest effects that a test finds with 90 % power, with a row for each effect.
+    """Return the smallest effects that a test finds with 90 % power.
 
-    - ``least``: smallest effect for a single test of the finding;
-    - ``least_corrected``: smallest effect after the correction over ``judged`` verdicts, for the
-      smallest p;
-    - ``larger``: by which share the distance from the bound must be larger after the correction.
+    There is a row for each effect in :data:`EFFECTS_WITH_POWER`. The columns are
+
+    - ``least``: smallest effect without the correction over verdicts;
+    - ``least_corrected``: smallest effect with the correction over ``judged`` verdicts, as for the
+      smallest p-value;
+    - ``larger``: the fraction by which the correction increases the distance of the smallest effect
+      from the bound.
     """
     rows, of_power = {}, stats.norm.ppf(POWER)
     for name, column in EFFECTS_WITH_POWER.items():
@@ -445,9 +456,9 @@ def tabulate_power(effects, judged):
 
 
 def on_the_same_tasks(values, measure, model):
-    """Return a measure of each model on the tasks on which ``model`` has it.
+    """Return a measure of each model on the tasks on which ``model`` has values of it.
 
-    Models without the measure on one of these tasks are left out.
+    Models without a value on one of these tasks are left out.
     """
     of = values[(values.index == measure) & (values["sample"] == "model")]
     tasks = of.task[of.model == model].unique()

@@ -3,8 +3,8 @@
     python studies/memory/protocols.py results/memory
     PYTHONPATH=studies python studies/memory/study.py results/memory
 
-Without a folder, tables and page are made from cells.csv and runs.csv.xz. hands.py has the runs on
-the learner's rule for hands, and one_selection.py those at equal gain.
+Without a folder, tables and page are made from cells.csv and runs.csv.xz. Script hands.py makes the
+runs on the learner's rule for hands, and one_selection.py those at equal gain.
 
 Random search is the learner without its memory. In this study it gets memory in doses: after each
 of r equal parts (stages) of its trials, it continues from its best trial, either from the postures

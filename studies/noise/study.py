@@ -28,10 +28,10 @@ _KEPT = [
 
 
 def executions_of(folder):
-    """Return the executions of a folder, with a row for each run, level of noise and target.
+    """Return the executions of a folder, by run, level of noise and target.
 
-    Column ``question`` is the part of the study to which the row belongs. Rows of the part on
-    memory are those that ship if the folder does not have it.
+    Column ``question`` is the part of the study to which the row belongs. If the folder lacks the
+    part on memory, the rows of this part are those of ``runs.csv.xz``.
     """
     tables = []
     parts = {"practised": "practised", "answers": "answers", "answers-of-cma-es": "answers"}
@@ -78,7 +78,7 @@ def tables_of(rows, hands, resamples=RESAMPLES):
 
 @figures.styled
 def draw(results):
-    """Draw the gap of each method in the four cases, with a label at the end of each line."""
+    """Draw the gap of each method in the four cases, with labelled lines."""
     figure, (axes,) = figures.panels((1, 1), (figures.TWO, 3.2))
     rows = results.reset_index().query("group == 'all'").set_index("name")
     methods = {name: label for label, name in order.LABELS.items()}
@@ -111,7 +111,10 @@ def draw(results):
 
 
 def _spread(values, least):
-    """Return values in rising order, moved up until they are a step of the log10 scale apart."""
+    """Return a dict of values that are moved up to be at least ``least`` apart in log10.
+
+    ``values`` are in rising order; the dict maps their names to the moved values.
+    """
     moved, before = {}, 0.0
     for name, value in values.items():
         moved[name] = before = max(value, before * 10**least)

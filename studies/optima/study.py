@@ -22,7 +22,7 @@ BOUNDS = {
 
 
 def distances(folder):
-    """Return the distance of each bound from the best known reward, by task.
+    """Return a table with the distance of each bound from the best known reward, by task.
 
     Distances are in per cent of the reward. ``seconds`` is the CPU time in the log of ``folder``.
     """
@@ -57,7 +57,10 @@ def count(bounds):
 
 
 def tabulate(folder):
-    """Return the tables: counts, and the tasks that are open."""
+    """Return the tables by name: ``results`` has counts, and ``open`` the open tasks.
+
+    A task is open if its bound is farther than 5 % from the best known reward, or if it has none.
+    """
     bounds = distances(folder)
     return {
         "results": count(bounds),
@@ -67,7 +70,7 @@ def tabulate(folder):
 
 @figures.styled
 def draw(table):
-    """Draw the shares of instances by the distance of their bounds, with a bar for each family."""
+    """Draw a bar for each row: the shares of instances by the distance of their bounds."""
     figure, (axes,) = figures.panels((1, 1), (figures.TWO, 4.2))
     shares = 100 * table[[*BOUNDS]].div(table.instances, axis=0).iloc[::-1]
     shades = "0.9", "0.8", "0.7", "0.5", "0.2"

@@ -51,7 +51,11 @@ QUANTITIES = {"lean": "more", "difference": "difference", "apart": "apart"}
 
 
 def over_people(values):
-    """Return the mean over people with its 95 % t interval, the SD, and p by sign flips."""
+    """Return the row of a test over people as a dict.
+
+    ``more`` is the mean over people, with its 95 % t interval (``low``, ``high``) and the standard
+    deviation (``sd``), and ``p`` is the p-value by sign flips.
+    """
     n, sd = len(values), values.more.std()
     half = stats.t.ppf(0.975, n - 1) * sd / n**0.5
     center = values.more.mean()
@@ -64,7 +68,10 @@ def over_people(values):
 
 
 def measure_people(table):
-    """Return the leans of each person and target, the tests, and the rows of the figure."""
+    """Return the tables on the lean of people by name, and their rows of the figure.
+
+    The tables are the leans of each person and target, the tests, their power, and the plan.
+    """
     every, counted = contexts_of(table), contexts_of(table[left_out(table) == ""])
     rows = leans(counted)
     judged = people(rows)
@@ -87,7 +94,11 @@ def measure_people(table):
 
 
 def measure_carry_over(table):
-    """Return the carry-over of each person and contrast, and the test with what is beside it."""
+    """Return the tables on carry-over by name.
+
+    They are the carry-over of each person and contrast, the judged test with the tests that are not
+    judged, and the power.
+    """
     contrasts = carried(table[left_out(table) == ""])
     rows = leans(contrasts).rename(columns={"target": "contrast", "more": "carry_over"})
     described = {
@@ -107,7 +118,10 @@ def measure_carry_over(table):
 
 
 def tabulate_postures(study):
-    """Return the postures of each run at both goals of its task: base and joints of the arm."""
+    """Return the postures of each run at the first two goals of its task.
+
+    A posture consists of the base and the joints of the right arm.
+    """
     rows = []
     for instance in INSTANCES:
         for label in METHODS:
@@ -125,10 +139,10 @@ def tabulate_postures(study):
 
 
 def measure_pairs(runs):
-    """Return the lean of each method on each pair of tasks, by part of the posture.
+    """Return the lean of each method on each pair of tasks, by part (:data:`PARTS`).
 
-    ``runs`` is a table as of :func:`tabulate_postures`. All runs of a pair begin in one posture. A
-    method with one run is deterministic.
+    ``runs`` is a table of :func:`tabulate_postures`. All runs of a pair begin in the same posture.
+    A method with only one run is treated as deterministic.
     """
     rows = []
     for (label, instance), of_pair in runs.groupby(["method", "task"], sort=False):
@@ -152,9 +166,10 @@ def measure_pairs(runs):
 
 
 def of_methods(rows):
-    """Return a row of the figure for each method: means over tasks, with intervals of the lean.
+    """Return a row of the figure for each method, with means over pairs of tasks.
 
-    They are of the joints. The mean lean of the base stands in columns ``base``.
+    The columns are about the joints, except ``base``, ``base_low`` and ``base_high``: the mean lean
+    of the base with its interval.
     """
     shown = {}
     for label, of_method in rows.groupby("method", sort=False):

@@ -76,9 +76,10 @@ def cell_of(method, setting):
 
 
 def read(folder):
-    """Return the study of a folder that has only some runs of a cell: those with its hands.
+    """Return the study of a folder that lacks some of the planned runs.
 
-    ``load`` refuses such a folder, because runs between them are missing.
+    A cell of this study has only the runs with its hands. :func:`coartic.analysis.load` refuses
+    such a folder.
     """
     folder = Path(folder)
     with open_results(folder) as store:
@@ -87,11 +88,11 @@ def read(folder):
 
 
 def stored(study):
-    """Return the runs of both worlds as they are stored, by run id.
+    """Return the runs of both worlds as they are stored, indexed by their ids.
 
-    ``value`` is minus the ticks of the answer: of the best trial without noise, and the mean of the
-    next action's executions with noise. ``best_known`` and ``corrective_best`` are minus ticks in
-    the same world.
+    ``value`` is minus the ticks of the solution: those of the best trial in the world without
+    noise, and the mean over executions in the world with noise. ``best_known`` and
+    ``corrective_best`` are minus ticks in the same world.
     """
     runs = pd.concat([each.runs.reset_index() for each in study.worlds.values()])
     return runs[_KEPT].set_index("run_id").dropna(axis="columns", how="all")
@@ -113,9 +114,10 @@ def measure_runs(runs):
 
 
 def by_cell(runs, column, replaced=()):
-    """Return a column of the runs, with a row for each run and a column for each cell.
+    """Return the values of one column, with a row for each run and a column for each cell.
 
-    Cells in ``replaced`` have their second-best setting. Only runs stay that all cells a to d have.
+    Cells in ``replaced`` have their second-best setting. Runs that not all of the cells a to d have
+    are left out.
     """
     wide = runs.pivot_table(column, ["motor_noise", "group", "task", "run"], "cell", sort=False)
     wide = wide.assign(**{cell: wide[f"{cell} second"] for cell in replaced})
@@ -123,7 +125,7 @@ def by_cell(runs, column, replaced=()):
 
 
 def effects_of(wide):
-    """Return the three effects, with a row for each row of cells."""
+    """Return the three effects (:data:`EFFECTS`) for each row of ``wide``."""
     return pd.DataFrame(
         {
             name: sum(weight * wide[cell] for cell, weight in weights.items())
@@ -133,11 +135,12 @@ def effects_of(wide):
 
 
 def summarise(values, name):
-    """Return the means of one column of runs by motor noise and group, with 95 % intervals.
+    """Return means of values by motor noise and group, with 95 % intervals.
 
-    Random tasks first have their mean over runs, and intervals are for other tasks. On the paper's
-    tasks intervals are for other runs. ``n`` is the number of tasks, or of runs on one task of the
-    paper. ``skewness`` is that of the values over tasks.
+    On random tasks, the means over the runs of each task are averaged, and intervals are for other
+    tasks. On the paper's tasks, intervals are for other runs. ``n`` is the number of tasks, or of
+    runs on one task of the paper. ``skewness`` is that of the values over tasks; it is missing for
+    the paper's tasks.
     """
     rows = []
     for noise, of_world in values.groupby(level="motor_noise", sort=False):
@@ -157,7 +160,7 @@ def summarise(values, name):
 
 
 def tabulate(runs):
-    """Tabulate the mean gap, and the mean logarithm of ticks, of each cell by world and group."""
+    """Tabulate the mean gap and logarithm of ticks of each cell, by world and group."""
     wide = {column: by_cell(runs, column) for column in ("gap", "log_ticks")}
     tables = []
     for cell in wide["gap"]:
@@ -172,7 +175,10 @@ def tabulate(runs):
 
 
 def _runs_in(values, noise, group):
-    """Return the number of runs of a world and a group, from values with a row for each run."""
+    """Return the number of runs of a world and a group.
+
+    ``values`` contains a value for each run.
+    """
     here = values.xs(noise, level="motor_noise").reset_index()
     is_random = here.task.str.contains("/")
     chosen = {RANDOM: is_random, PAPER: ~is_random}
@@ -199,8 +205,7 @@ def tabulate_effects(runs):
 
 
 def _with_rows(table, keys):
-    """Return a table whose index has the values of the keys in words, and whose first columns are
-    the keys."""
+    """Return a table whose first columns are ``keys``, and whose index joins their values."""
     words = table[keys].astype(str).agg(", ".join, axis=1)
     others = [name for name in table if name not in keys]
     return table[[*keys, *others]].set_axis(words.rename("row"), axis=0)
@@ -228,9 +233,10 @@ def judge_claims(runs):
 
 
 def measure_power(runs):
-    """Return the spread of the effects over tasks, and the smallest effects with 90 % power.
+    """Return the spread of the effects over tasks, and the effects with 90 % power.
 
-    They are for a one-tailed test at 5 %/6 over 100 tasks, by the normal approximation.
+    Column ``smallest`` is the smallest effect that a one-tailed test at the level 5 % / 6 over 100
+    tasks finds with 90 % power, by the normal approximation.
     """
     tasks = effects_of(by_cell(runs, "gap")).groupby(level=["motor_noise", "task"]).mean()
     rows = []
@@ -244,7 +250,7 @@ def measure_power(runs):
 
 
 def tabulate_hands(runs, executions):
-    """Tabulate how much of the learner's distance to the policy gradient is the choice of hands.
+    """Tabulate how much of the learner's lag behind the policy gradient hands explain.
 
     ``executions`` are the stored rows of study noise. They have the policy gradient that chooses
     its hands, on the same tasks. There is a row for each world and family with two arms, and one

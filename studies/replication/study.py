@@ -52,7 +52,7 @@ def judge_by_first(studies):
 
 
 def rank(verdicts):
-    """Return the positions of a column of verdicts in :data:`VERDICTS`."""
+    """Return the position in :data:`VERDICTS` of each entry of a column of verdicts."""
     return verdicts.map(VERDICTS.index)
 
 

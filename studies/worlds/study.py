@@ -68,14 +68,19 @@ BETTER = {
     "policy-gradient-ahead": (LEARNER, GRADIENT),
     "hill-climbing-ahead": (LEARNER, CLIMBING),
 }
-"""Comparisons of ticks: the method that may need more, and the one that may need fewer. The last
-is described, and is no claim."""
+"""Dict that maps each comparison of ticks to two methods: the one that is expected to need more
+ticks, and the one that is expected to need fewer. The last comparison is only described, and is not
+a claim."""
 SHARED = ("ascending", "descending")
 PARTS = ("all", "base", "joints")
 
 
 def base_name(task):
-    """Return the task of which a task with another radius is made: its name without the radius."""
+    """Return the name of the task from which a task with another radius is made.
+
+    For ``one-armed-i200-radius-0.02`` it is ``one-armed/v1/i200``. The name of a task with the
+    original radius is returned unchanged.
+    """
     name = task.partition("-radius-")[0]
     family, _, number = name.rpartition("-")
     is_instance = family in FAMILIES and not number.isdecimal()
@@ -83,12 +88,17 @@ def base_name(task):
 
 
 def of_world(world, study):
-    """Return the runs of a world with their ticks and first movements, and the leans of its pairs.
+    """Return a table of the runs of a world, and the table of :func:`leans_of`.
 
-    Runs: ``world``, ``group`` (family, or task of the paper), ``task``, ``method``, ``run``,
-    ``seed``, ``status``, ``ticks`` (missing if the run failed), ``alone`` (ticks of the corrective
-    process with its best hands), ``first`` (ticks by which the first movement is longer than in the
-    corrective process with the same hands), ``hands``.
+    The table of runs leaves out tasks whose names end in ``-goal`` or ``-back``, which only
+    :func:`leans_of` needs. Its columns are
+
+    - ``world``, ``task``, ``method``, ``run``, ``seed``, ``status`` and ``hands``;
+    - ``group``: the family, or the task of the paper;
+    - ``ticks``: ticks of the solution; missing if the run failed;
+    - ``alone``: ticks of the corrective process with its best hands;
+    - ``first``: ticks by which the first movement is longer than in the corrective process with the
+      same hands.
     """
     runs = study.runs
     method = runs.method.where(~runs.method.str.startswith("dual-process"), LEARNER)
@@ -112,9 +122,10 @@ def of_world(world, study):
 
 
 def read(folder):
-    """Return the study of a folder without best known rewards.
+    """Return the study of a folder, without best known rewards.
 
-    The study has no gaps, and in noise each best known reward takes a thousand executions.
+    This study needs no gaps. In a world with noise, each best known reward would be computed from a
+    thousand executions.
     """
     study = load(folder)
     vars(study)["optima"] = {}
@@ -122,7 +133,10 @@ def read(folder):
 
 
 def leans_of(world, study):
-    """Return the lean of each method at the goal that two tasks share, by pair and part."""
+    """Return the leans of the learner EC1 and of random search, by pair of tasks and part.
+
+    The lean is measured at the first goal, which the tasks of a pair share.
+    """
     names, rows = {base_name(name): name for name in study.tasks}, []
     numbers = [name.removesuffix("-goal") for name in names if name.endswith("-goal")]
     pairs = {number: (f"{number}-goal", f"{number}-back") for number in numbers}
@@ -148,7 +162,7 @@ def leans_of(world, study):
 
 
 def lean_of(first, second, part):
-    """Return the lean at goal 1 (per cent) of runs on two tasks; NaN where it does not apply."""
+    """Return the lean at goal 1 of runs on two tasks, in per cent; NaN if it is not defined."""
     if not (first.runs and second.runs):
         return Estimate(np.nan)
     contexts = TwoContexts(first, second, 1, "right", part=part)
@@ -159,22 +173,32 @@ def lean_of(first, second, part):
 
 
 def with_failures(runs):
-    """Return runs in which a failed run has the ticks of the worst run on its task and world."""
+    """Return runs in which each failed run has the ticks of the worst run.
+
+    The worst run is that with the most ticks on the same task in the same world, of any method in
+    ``runs``. Column ``failed`` is True for failed runs.
+    """
     worst = runs.groupby(["world", "task"]).ticks.transform("max")
     return runs.assign(failed=runs.ticks.isna(), ticks=runs.ticks.fillna(worst))
 
 
 def shares(runs, claim):
-    """Return the value of each run for a claim about runs, % of the corrective process's ticks."""
+    """Return the contribution of each run to the value of a claim.
+
+    The contribution is in per cent of the ticks of the corrective process. Its sign is changed for
+    runs of the method that is subtracted.
+    """
     sign = np.where(runs.method == (BETTER[claim][0] if claim in BETTER else LEARNER), 1, -1)
     value = runs.ticks if claim in BETTER else runs["first"]
     return sign * 100 * value / runs.alone
 
 
 def values_of(runs, claim):
-    """Return a claim's value for each task (``value``), with the counts of runs and failures.
+    """Return the value of a claim for each task, with counts of runs.
 
-    Index: world, group, task. A value is NaN if the task is dropped.
+    The index consists of world, group and task. ``value`` is NaN if the task is dropped. ``runs``
+    and ``failed`` are the numbers of runs and of failed runs. ``lost`` is the number of runs that
+    failed or, for a signature, do not have it.
     """
     methods = BETTER.get(claim, (LEARNER, RANDOM))
     used = with_failures(runs)
@@ -190,7 +214,7 @@ def values_of(runs, claim):
 
 
 def values_of_pairs(leans, claim):
-    """Return a claim's value for each pair, as :func:`values_of` does for tasks."""
+    """Return the value of a claim for each pair of tasks, in the form of :func:`values_of`."""
     part = "joints" if claim == "joints-lean" else "all"
     used = leans[leans.part == part]
     table = used.pivot_table("lean", ["world", "pair"], "method", dropna=False)
@@ -205,12 +229,20 @@ def values_of_pairs(leans, claim):
 
 
 def verdicts(cells):
-    """Judge the cells of a claim: a mapping of a cell to its values, one for each task.
+    """Judge the cells of a claim.
 
-    Returns a table with a row for each cell: ``p`` and ``opposite_p`` after correction, each with
-    ``_without`` the task that favours this side most, ``skewness``, the verdict with all tasks
-    (``all_tasks``), that ``without`` this task, the ``verdict`` that needs both, and the one that
-    two-tailed tests would give (``verdict_two_tailed``; a description, not registered).
+    ``cells`` is a dict that maps each cell to its values, one for each task. The result is a table
+    with a row for each cell and the columns
+
+    - ``p``, ``opposite_p``: Holm-adjusted p-values of the claim and of its opposite;
+    - ``p_without``, ``opposite_p_without``: the same without the task that favours the tested side
+      most;
+    - ``skewness``: skewness of the values;
+    - ``all_tasks``, ``without``: verdicts from the p-values with and without this task;
+    - ``verdict``: the verdict that both give if the p-values are below :func:`.level_of`, otherwise
+      ``open``;
+    - ``verdict_two_tailed``: the verdict that two-tailed tests would give. It is only a
+      description, and was not registered.
     """
     count, columns = len(cells), {}
     for side, name in (("greater", "p"), ("less", "opposite_p")):
@@ -244,7 +276,10 @@ EXPECTED = {"h": "holds", "r": "reversed", "o": "open"}
 
 
 def tabulate(runs, leans):
-    """Return the matrix: a row for each claim, world and family, or task of the paper."""
+    """Return the matrix, with a row for each claim, world and group.
+
+    A group is a family with values for at least three tasks, or a task of the paper.
+    """
     rows = []
     for claim in CLAIMS:
         found = (values_of_pairs(leans, claim) if claim.endswith(("leans", "lean"))
@@ -276,8 +311,8 @@ def tabulate(runs, leans):
 def of_paper(claim, world, task, runs, leans):
     """Return a claim's value on a task of the paper, with its interval over runs.
 
-    The difference of two leans has the interval of Zou and Donner (2008), which is made of the
-    intervals of both.
+    The interval of a difference of two leans is computed from the intervals of both, by the method
+    of Zou and Donner (2008).
     """
     if claim.endswith(("leans", "lean")):
         part = "joints" if claim == "joints-lean" else "all"
@@ -300,9 +335,10 @@ def of_paper(claim, world, task, runs, leans):
 
 
 def control_values(study, runs):
-    """Return the values of each set of control runs: those of random search in the learner's place.
+    """Return the values of claims with control runs in place of the learner's runs.
 
-    Columns: ``set``, ``claim``, ``group``, ``task``, ``value``.
+    Control runs are runs of random search with other seeds, which are divided into sets. The
+    columns are ``set``, ``claim``, ``group``, ``task`` and ``value``.
     """
     controls, _ = of_world("paper", study)
     controls = controls.assign(set=controls.run - RUNS["families"] + 1, method=LEARNER)
@@ -317,7 +353,7 @@ def control_values(study, runs):
 
 
 def control_values_of_pairs(study, leans):
-    """Return the same for the claim that the learner leans more, by pair."""
+    """Return the table of :func:`control_values` for the claim on leans, by pair of tasks."""
     theirs = leans[(leans.world == "paper") & (leans.part == "all") & (leans.method == RANDOM)]
     theirs, rows = theirs.set_index("pair").lean, []
     runs = study.runs.set_index("run_id").run
@@ -332,14 +368,17 @@ def control_values_of_pairs(study, leans):
 
 
 def some(solutions, number, runs):
-    """Return the solutions of a set of control runs on a task of a pair."""
+    """Return those of the ``solutions`` of control runs that belong to one set."""
     of_set = [runs[name] // RUNS_OF_PAIRS == number for name in solutions.run_ids]
     keep = [run for run, wanted in zip(solutions.runs, of_set, strict=True) if wanted]
     return type(solutions)(solutions.task, solutions.label, tuple(keep), model=solutions.model)
 
 
 def judge_control(values):
-    """Return for each claim in how many sets of seeds it holds, or is reversed, in some family."""
+    """Count the sets of control runs in which a claim holds, or is reversed, in some family.
+
+    There is a row for each claim. ``bound`` is the registered bound of the share of sets.
+    """
     rows = []
     for (claim, number), of_set in values.groupby(["claim", "set"], sort=False):
         cells = {group: each.value.dropna().to_numpy(float)
@@ -377,7 +416,7 @@ SHOWN = [
 
 @figures.styled
 def draw(table):
-    """Draw the matrix: estimate and interval of each cell with a verdict; open cells stay blank."""
+    """Draw the matrix: the estimate and the interval of each cell that is not open."""
     worlds = [name for name in sorted(WORLDS, key=SHOWN.index) if (table.world == name).any()]
     figure, panels = figures.panels((len(CLAIMS), 1), (figures.TWO, 7.6), sharex=True)
     for axes, claim in zip(panels, CLAIMS, strict=True):
@@ -408,10 +447,10 @@ def draw(table):
 
 
 def describe(runs):
-    """Return comparisons without a verdict: mean values over the random tasks of a family.
+    """Return the mean values of comparisons without a verdict, over the random tasks of a family.
 
-    They are those of hill climbing in all worlds, and at radius 0.02 after 100,000 trials those of
-    the methods that were run.
+    They are the comparison with hill climbing in all worlds, and at radius 0.02, after 100,000
+    trials, the comparisons of the methods that were run.
     """
     parts = []
     for claim in (*BETTER, "first-movement-slower"):
@@ -428,7 +467,10 @@ def describe(runs):
 
 
 def of_whole_worlds(runs):
-    """Return runs without the further runs on random tasks of worlds that lack some of them."""
+    """Return runs without the incomplete further runs on random tasks.
+
+    Further runs are those after run 0. They are left out in each world that lacks some of them.
+    """
     further = runs.group.isin(FAMILIES) & (runs.world != LONG.name) & (runs.run > 0)
     counted = runs[runs.group.isin(FAMILIES) & runs.method.isin([LEARNER, RANDOM, GRADIENT])]
     least = counted.groupby(["world", "task", "method"]).size().groupby("world").min()
