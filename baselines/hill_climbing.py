@@ -55,7 +55,7 @@ _MAX_DRAWN_TRIALS = 128  # largest number of trials that are drawn ahead
 class HillClimbingParameters(SequenceParameters):
     """Parameters of hill climbing.
 
-    The default ``trials`` and ``sigma`` are the learner's; ``begin`` is not.
+    The defaults of ``trials`` and ``sigma`` are the learner's; the default of ``begin`` is not.
     """
 
     begin: Literal["correction", "best"] = "correction"

@@ -60,7 +60,8 @@ _CLIP = 3.0  # largest advantage
 _RATE = 0.1  # of the running means b and d, for each batch
 _LOG_BOUNDS = math.log(0.005), math.log(0.3)  # of a learned spread, in length units and rad
 _TUNED = {"learned": (25, 2.0, 0.1), "fixed": (25, 1.0, 0.0)}
-"""Defaults of ``batch``, ``step`` and ``spread_step``, by ``spread``."""
+"""Dict that maps each value of ``spread`` to the defaults of ``batch``, ``step`` and
+``spread_step``."""
 
 
 class PolicyGradientParameters(SequenceParameters):
@@ -123,8 +124,8 @@ class Policy(Search):
     def generation(self) -> None:
         """Make the trials of a batch, and update mean and spread by the policy gradient.
 
-        If fewer trials are left than belong to a batch, only the trials that are left are made, and
-        nothing is updated.
+        If fewer trials are left than belong to a batch, only these trials are made, and mean and
+        spread are not updated.
         """
         z = self._rng.standard_normal((self._batch, len(self.mean)))
         spread = exp(self.log_spread)

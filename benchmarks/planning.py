@@ -399,7 +399,7 @@ def _suite_jobs(
     registered : mapping of str to MethodInfo
         Dict that maps ids to all known methods.
     own : collection of str
-        Names of the user's tasks, which belong to each block for all tasks (``*``).
+        Names of tasks that are added to each block whose ``tasks`` contain ``*``.
     task_named : callable
         Function that returns the task with a given name.
     job : callable

@@ -55,7 +55,8 @@ if TYPE_CHECKING:
     from coartic.tasks.task import Task
 
 METHOD_PREFIX = "dual-process/"
-"""Prefix of the ids of the learner's methods, which the id of the exploration condition follows."""
+"""Prefix of the ids of the learner's methods. After the prefix comes the id of the exploration
+condition, or ``custom``."""
 MAX_NOISE = 100.0
 """Largest allowed standard deviation of exploration noise, in length units and rad."""
 Share = Annotated[float, Field(ge=0, le=1)]

@@ -123,6 +123,11 @@ class DualProcess(Method):
         list of Result or MethodError
             For each session, in order, the result of :meth:`solve`, or the MethodError that
             :meth:`solve` would raise.
+
+        Raises
+        ------
+        NotApplicableError
+            The condition does not apply to the task, or no initial hands are found.
         """
         parameters, condition = self.parameters, self.rules()
         tasks = [session.reveal(*self.information) for session in sessions]
@@ -234,9 +239,9 @@ class CustomDualProcess(DualProcess):
     )
 
     def rules(self) -> ExplorationCondition:
-        """Return a copy of condition ``base`` in which the parameters change fields.
+        """Return a copy of condition ``base`` with the fields that the parameters set.
 
-        A field does not change if its parameter is None. The id of the copy is, for example,
+        If a parameter is None, its field is that of ``base``. The id of the copy is, for example,
         ``EC4, changed,``.
         """
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
