@@ -43,7 +43,10 @@ class Aim(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A simulated movement to a goal, from the start or from the end of the leg before."""
+    """A simulated movement to a goal, which begins at the end of the leg before.
+
+    The first leg begins at the start of the task.
+    """
 
     movement: Movement
     """Movement of kind ``path`` to the goal."""

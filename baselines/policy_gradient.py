@@ -81,7 +81,7 @@ class PolicyGradientParameters(SequenceParameters):
 
     @property
     def steps(self) -> tuple[int, float, float]:
-        """The batch size B and the step sizes α and β (0 for a fixed spread)."""
+        """Batch size B, and step sizes α and β (0 for a fixed spread)."""
         batch, step, spread_step = _TUNED[self.spread]
         if self.spread == "learned":
             spread_step = self.spread_step or spread_step

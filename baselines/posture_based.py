@@ -401,7 +401,7 @@ def _linearise_far(
     xs: Any,
     ys: Any,
 ) -> int:
-    """Find the postures in which a hand is far from (x, y), and linearise its position there.
+    """Find postures in which a hand is far from (x, y), and linearise its position.
 
     Parameters
     ----------

@@ -215,7 +215,7 @@ def chains_of(
 def _extend(
     task: Task, layers: Layers, begun: PrefixCosts, base_weight: float
 ) -> Iterator[PrefixCosts]:
-    """Extend a prefix by the next goal, with each hand that has nodes at this goal.
+    """Extend a prefix by the next goal, with each hand that has nodes there.
 
     ``begun`` contains the costs of the prefix of hand sequences. Yields the costs of each longer
     prefix, the one with the left hand first. ``layers`` and ``base_weight`` are as in

@@ -97,7 +97,7 @@ _OPTIONS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Instance:
-    """Data of one problem: start, goals with their radius, hand of each goal, and held joints."""
+    """Data of one problem: start, goals, radius, hands and held joints."""
 
     q0: Array
     """Starting configuration, shape ``(dof,)``, in length units and rad."""
@@ -387,7 +387,7 @@ class TrajectoryProblem:
 
 
 def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
-    """Return the smallest cost of a segment, given the states of the joints at its ends.
+    """Return the smallest cost of a segment with given joint states at its ends.
 
     Among all movements between two states of the joints (position, velocity and, for jerk,
     acceleration), a cubic minimises ∫|q̈|² and a quintic minimises ∫|q⃛|² (Flash & Hogan 1985).

@@ -128,7 +128,7 @@ class Rounding:
         Yields
         ------
         tuple of int
-            Numbers (from 0) of the goals that take no movement. The first tuple is empty.
+            Numbers (from 0) of the goals to which there is no movement. The first tuple is empty.
         PathPlan
             Shortest plan found for these goals.
         """
@@ -167,7 +167,7 @@ class Rounding:
             Number of steps to each goal except the last goal. The number of steps to the last goal
             is the smallest that the solver finds.
         merged : tuple of int
-            Goals, from 0, that take no movement.
+            Numbers (from 0) of the goals to which there is no movement.
 
         Returns
         -------
@@ -207,7 +207,7 @@ class Rounding:
         lengths : ndarray, shape (G,)
             Largest joint-space length of each movement; NaN for a movement of any length.
         merged : tuple of int
-            Goals, from 0, that take no movement.
+            Numbers (from 0) of the goals to which there is no movement.
         deep : sequence of int
             Numbers of goals, from 0. If there are any, the solver does not minimise the path
             length; it moves the hands as deep into the discs of these goals as ``lengths`` allow.

@@ -76,6 +76,11 @@ def check_method(
     -------
     list of CheckResult
         A result for each check, in the order of :data:`CHECKS`.
+
+    Raises
+    ------
+    CoarticError
+        Worker processes cannot start, or the file of the method was changed after it was read.
     """
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
@@ -147,7 +152,7 @@ def _solution(info: MethodInfo, runs: _Runs) -> Iterator[str]:
 
 
 def _changes(runs: _Runs, kind: str, how: str) -> Iterator[str]:
-    """Yield a sentence for each difference between the runs of one kind and the first runs.
+    """Yield a sentence for each difference between runs of one kind and first runs.
 
     On each task, the run of kind ``kind`` is compared with the run of kind ``first``. Each sentence
     begins with ``how``, in which the name of the task replaces ``{}``.
@@ -278,10 +283,7 @@ second function returns a sentence on what was checked; it is called if there is
 
 
 def _hopeless_task(like: Task) -> Task:
-    """Return a copy of a task that has only one goal, which is out of reach.
-
-    The base of the copy is locked.
-    """
+    """Return a copy of a task with a locked base and one unreachable goal."""
     return like.model_copy(
         update={
             "name": "hopeless",

@@ -216,7 +216,7 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of each folder whose plan has cells with missing runs, or with too few runs.
+    """Warn of each folder whose plan has cells with missing or too few runs.
 
     A cell has missing runs if the joined plan has fewer runs of the cell than the plan of the
     folder. A cell has too few runs if its method is stochastic, the command does not ask for the

@@ -51,7 +51,7 @@ from coartic.tasks.task import address_of, check_task
 
 
 def _task_or_name(value: Any) -> Task | str:
-    """Validate a task: return a Task unchanged, and a name or a path as a string."""
+    """Validate a task: return a Task unchanged, a name or path as a string."""
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
     raise described_error(f"task {value!r} must be a name, a path or a Task")

@@ -232,12 +232,12 @@ class Local:
 
     @staticmethod
     def _replace_pool(group: _Group, running: dict[Future[Any], tuple[_Group, int, Job]]) -> None:
-        """Close the broken process pool of a group; the group's next job starts a new pool.
+        """Close the broken process pool of a group.
 
-        The jobs of the broken pool that have no answer yet are put back into the queue. ``running``
-        is a dict that maps the future of each running job of all groups to a tuple: its group, its
-        number and the job. Raises BrokenExecutor if five pools of the group have broken since a job
-        of the group got an answer.
+        The next job of the group starts a new pool. The jobs of the broken pool that have no answer
+        yet are put back into the queue. ``running`` is a dict that maps the future of each running
+        job of all groups to a tuple: its group, its number and the job. Raises BrokenExecutor if
+        five pools of the group have broken since a job of the group got an answer.
         """
         error: BaseException | None = None
         for future, (of, number, job) in [*running.items()]:

@@ -337,7 +337,7 @@ def _repeat_runs(
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return a job for each cell of a plan in which runs have to be performed.
+    """Return a job for each planned cell in which runs have to be performed.
 
     A run has to be performed in two cases:
 

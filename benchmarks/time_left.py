@@ -152,7 +152,7 @@ def _shipped_s(kind: _Kind) -> float:
 
 @cache
 def _shipped_means() -> Mapping[str, Mapping[str, float]]:
-    """Return the mean wall times of shipped runs (in s), keyed by method and then by task.
+    """Return the mean wall times of shipped runs (in s) for each method and task.
 
     The result is a dict that maps ids of methods to dicts that map names of tasks to means. The
     means are over the shipped runs in the paper's world with the default parameters.

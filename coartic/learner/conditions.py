@@ -187,7 +187,7 @@ class ExplorationCondition:
 
     @property
     def drifts(self) -> tuple[float, ...]:
-        """The values of field ``drift`` (κ) as a tuple, even if ``drift`` is a single number."""
+        """The values of ``drift`` (κ) as a tuple, even if there is only one."""
         return self.drift if isinstance(self.drift, tuple) else (self.drift,)
 
     @property
@@ -196,7 +196,7 @@ class ExplorationCondition:
         return any(self.drifts) or self.pull > 0
 
     def inapplicable_reason(self, task: Task | Outline) -> str | None:
-        """Return why the condition does not apply to the hands of a task; None if it applies."""
+        """Return why the condition does not fit a task's hands; None if it fits."""
         missing = [hand for hand in self.hands if hand not in task.hands]
         if missing:
             return (

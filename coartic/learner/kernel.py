@@ -234,7 +234,7 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
 
 
 def workspace_for(runs: int, task: Task) -> _Workspace:
-    """Return new arrays in which the kernel makes ``runs`` runs of a task, at most 72."""
+    """Return new arrays for a kernel that makes ``runs`` runs, at most 72."""
     return _Workspace(
         batch=batch_for(task.robot, runs),
         counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),

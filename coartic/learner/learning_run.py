@@ -136,7 +136,7 @@ class LearningRun:
 
     @property
     def reward(self) -> int | None:
-        """Total reward of the best trial or of the replay; None if no such trial hit every goal.
+        """Total reward of the best trial or of the replay; None without such a trial.
 
         It is the reward of the replay if the condition has ``learned="replay"``, and otherwise the
         highest reward of all trials. With motor noise, the reward of this single trial is partly

@@ -127,7 +127,7 @@ class DualProcess(Method):
         Raises
         ------
         NotApplicableError
-            The condition does not apply to the task, or no initial hands are found.
+            No initial hands are found.
         """
         parameters, condition = self.parameters, self.rules()
         tasks = [session.reveal(*self.information) for session in sessions]
