@@ -1,1 +1,1 @@
-"""Methods with which the learner is compared, one concept a file."""
+"""Methods with which the learner is compared, one concept in each file."""

@@ -25,7 +25,7 @@ class Search(ABC):
     """Base class of the searches over the targets of one hand sequence.
 
     The constructor makes one trial, in which only the corrective process acts. If that trial fails,
-    :attr:`reward` is -inf, and the search cannot make generations.
+    :attr:`reward` is -inf, and callers must not call :meth:`generation`.
 
     Parameters
     ----------
@@ -44,8 +44,9 @@ class Search(ABC):
         self.reward = float(corrective_trial.rewards[0])
         """Best reward so far; -inf if the corrective process does not complete the sequence."""
         self.first_mean: Array = corrective_trial.reached[0, attempts.explored]
-        """Explored joints of the postures in which the corrective process hit the goals, goal by
-        goal, shape ``(n,)``, in length units and rad."""
+        """Postures in which the corrective process hit the goals: the values of the explored
+        joints, goal by goal, shape ``(n,)``, in length units and rad; NaN for goals that were not
+        hit."""
 
     def make_trials(self, values: Array) -> Array:
         """Make the trials of a generation, and return their rewards.
@@ -53,13 +54,14 @@ class Search(ABC):
         Parameters
         ----------
         values : ndarray, shape (N, n)
-            Targets of the n explored joints of all goals, goal by goal, in length units and rad.
+            Targets of the explored joints, goal by goal, in length units and rad. A row contains
+            the n targets of a trial.
 
         Returns
         -------
         ndarray, shape (M,)
-            Rewards of the trials, -inf for a failed trial. If fewer than N trials are left, only
-            the first M are made.
+            Rewards of the trials, -inf for a failed trial. If only M < N trials are left, only the
+            first M trials are made; otherwise M is N.
 
         Notes
         -----
@@ -83,10 +85,11 @@ class Search(ABC):
     def answer(self) -> tuple[float, Array]:
         """Cost and targets that the search recommends.
 
-        - The cost is the mean cost of the trials of a complete generation, in ticks. Without a
-          complete generation it is infinity.
+        - The cost is the mean cost of the trials of a complete generation, in ticks.
         - The targets are the mean of the search after that generation, shape ``(n,)``, in length
           units and rad.
+
+        Without a complete generation, the cost is infinity, and the targets are :attr:`first_mean`.
         """
 
 
@@ -96,7 +99,7 @@ def solve_by_bandit(
     make_search: Callable[[Attempts, str], Search],
     exploration: float,
 ) -> Result:
-    """Try each hand sequence once, then share the other trials between the sequences by UCB1.
+    """Try each hand sequence once, then divide the remaining trials among them by UCB1.
 
     1. For each hand sequence, ``make_search`` makes a search, which makes one trial in which only
        the corrective process acts. If this trial fails, the hand sequence gets no further trials.
@@ -120,12 +123,12 @@ def solve_by_bandit(
         Function that makes the search of a hand sequence. Its arguments are the Attempts of the run
         and the hand sequence, such as ``"RRLR"``.
     exploration : float
-        Constant c of UCB1, as a multiple of the range of the first rewards (at least 1 tick).
+        Constant of UCB1, as a multiple of the range of the first rewards (:func:`spend_trials`).
 
     Returns
     -------
     Result
-        The movements of the best trial. With motor noise, the movements to the recommended mean
+        The movements of the best trial; with motor noise, the movements to the recommended targets
         (:func:`recommend`). The details contain ``best_trial``, the number of the best trial from
         0, and ``trials``, a dict that maps each hand sequence to its number of trials.
 
@@ -134,7 +137,8 @@ def solve_by_bandit(
     MethodError
         No trial is left to make, or no trial hits every goal.
     NotApplicableError
-        No initial sequence is found where one is needed.
+        The method needs the task's initial hand sequence, and the session does not find one
+        (:meth:`.Session.find_initial_hands`).
     ValueError
         Parameter ``sequence`` does not fit the task.
     """
@@ -157,19 +161,24 @@ def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: fl
 
         R + c sqrt(2 ln(N) / n)
 
-    Here R is the best reward of the search so far, n is the number of its generations, N is the
-    number of generations of all searches, and c is ``exploration`` times the range of the first
-    rewards of the searches (at least 1 tick). The first trial of a search is counted as a
-    generation. Searches whose first trial failed do not take part.
+    Here
+
+    - R is the best reward of the search so far;
+    - n is the number of generations of the search, and N the number of generations of all searches
+      (the first trial of a search is counted as a generation);
+    - c is ``exploration`` times the difference between the highest and the lowest first reward of
+      the searches, or ``exploration`` times 1 tick if this difference is below 1 tick.
+
+    Searches whose first trial failed do not take part.
 
     Parameters
     ----------
     searches : sequence of Search
     attempts : Attempts
-        Trials of the run. The function returns when no trial is left, or if the first trials of all
-        searches have failed.
+        Makes and counts the trials of the run. The function returns when no trial is left, or if
+        the first trials of all searches have failed.
     exploration : float
-        Constant of UCB1, as a multiple of the range of the first rewards.
+        Factor of the constant c.
     """
     promising = [search for search in searches if search.reward > -math.inf]
     rewards = [search.reward for search in promising] or [0.0]
@@ -186,10 +195,10 @@ def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: fl
 
 
 def recommend(searches: Iterable[Search], attempts: Attempts) -> tuple[Movement, ...]:
-    """Return movements to the recommended targets with the lowest cost (:attr:`Search.answer`).
+    """Return movements to the targets of the search that recommends the lowest cost.
 
-    If no search has made a complete generation, the search with the hand sequence of the best trial
-    recommends the targets.
+    Each search recommends a cost and targets (:attr:`Search.answer`). If no search has made a
+    complete generation, the targets come from the search whose hand sequence the best trial used.
     """
     best = min(
         searches, key=lambda each: (each.answer[0], each.hand_sequence != attempts.hand_sequence)

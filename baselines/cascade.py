@@ -11,8 +11,9 @@ most ε more than the solution of level 1 does::
     min  |x - z|²         subject to   A x >= b - s⁺ - ε,  |x_i| <= L
      x
 
-Here A x >= b is the task, s is its slack variable, s⁺ = max(s, 0), λ is ``DAMPING``, L is ``LIMIT``
-and ε is ``SLACK``.
+Here A x >= b is the task, s is a slack variable that all rows of the task share, s⁺ = max(s, 0), λ
+is ``DAMPING``, L is ``LIMIT`` and ε is ``SLACK``. The caller chooses the unit of length of A and b,
+and the unit of x.
 
 Inequality tasks in lexicographic quadratic programmes come from O. Kanoun, F. Lamiraux, P.-B.
 Wieber (2011), Kinematic control of redundant manipulators: generalizing the task-priority framework
@@ -31,27 +32,27 @@ from coartic.method import MethodError
 from coartic.robot import Array
 
 DAMPING = 0.01
-"""λ, in length units per unit of change. In directions in which the singular value of A is 1,
-damping leaves about 1e-4 of the task undone. In directions in which it is 0, damping keeps changes
-small."""
+"""λ, in the caller's unit of length per unit of change. In directions in which the singular value
+of A is 1, damping leaves about 1e-4 of the task undone. In directions in which the singular value
+is near 0, damping keeps changes small."""
 
 LIMIT = 2.0
-"""L, the largest absolute change of a joint."""
+"""L, the largest absolute change of a joint, in the caller's unit of change."""
 
 SLACK = 1e-6
-"""ε, in length units. Without this slack, the feasible set of level 2 could be a single point when
-the limits of the changes bind."""
+"""ε, in the caller's unit of length. Without this slack, the feasible set of level 2 could be a
+single point when the limits of the changes bind."""
 
 
 class Solution(NamedTuple):
-    """Solution of both levels of the cascade."""
+    """Solutions of both levels of the cascade."""
 
     changes: Array
-    """Changes of the joints by both levels, shape ``(joints,)``."""
+    """Changes of the joints that solve level 2, shape ``(joints,)``."""
     level_1: Array
-    """Changes of the joints by level 1 only, shape ``(joints,)``."""
+    """Changes of the joints that solve level 1, shape ``(joints,)``."""
     iterations: int
-    """Iterations of the solver in both levels."""
+    """Total number of iterations of the solver in both levels."""
 
 
 def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
@@ -60,9 +61,9 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
     Parameters
     ----------
     rows : ndarray, shape (m, joints)
-        Matrix A of the task, in length units per unit of change.
+        Matrix A of the task.
     least : ndarray, shape (m,)
-        Vector b of the task: lower bounds of A x, in length units.
+        Vector b of the task: lower bounds of A x.
     preferred : ndarray, shape (joints,)
         Preferred change z.
 
@@ -89,8 +90,9 @@ def _solve_level(
 ) -> tuple[Array, int]:
     """Minimise ½ vᵀ H v + gᵀ v under the constraints of a level.
 
-    H is ``hessian`` and g is ``gradient``; v is (s, x) at level 1 and x at level 2. Return v and
-    the number of iterations. Raises MethodError if the solver fails.
+    H is ``hessian`` and g is ``gradient``; v is (s, x) at level 1 and x at level 2. ``least``
+    contains the right-hand sides of the task's constraints. Return v and the number of iterations.
+    Raises MethodError if the solver fails.
     """
     task, joints = rows.shape
     matrix = np.zeros((task + 2 * joints, len(gradient)))

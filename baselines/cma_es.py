@@ -10,23 +10,24 @@ Each hand sequence has its own evolution strategy (CMA-ES) over the targets of a
   the population size (IPOP).
 
 ``cma-es/bandit`` first makes one trial with each hand sequence. If the task has more than 4096 hand
-sequences, the method uses only the initial sequence. Then UCB1 chooses the strategy that makes the
-next generation of trials; the value of a strategy is the best reward of its sequence so far. The
-exploration bonus of UCB1 is scaled by the range of the rewards of the first trials.
+sequences, the method uses only the task's initial sequence. Then UCB1 chooses the strategy that
+makes the next generation of trials; the value of a strategy is the best reward of its sequence so
+far. The exploration bonus of UCB1 is scaled by the range of the rewards of the first trials.
 
 ``cma-es/goal-by-goal`` keeps a value table keyed by goal, hand at the goal before, and hand at this
 goal. The value of an entry is the best reward of all hand sequences tried so far that have these
-two hands at these two goals. The method chooses the hands of a sequence from the first goal to the
-last: the hand with the higher value, or a random hand with probability ε. When a sequence is chosen
-for the first time, the method makes one trial with only the corrective process. If that trial
-succeeds, each later choice of the sequence makes one generation of the strategy of this sequence.
+two hands at these two goals. The first sequence is the task's initial one. Each later sequence is
+chosen goal by goal, from the first goal to the last: at each goal, the hand with the higher value
+or, with probability ε, a random hand. When a sequence is chosen for the first time, the method
+makes one trial with only the corrective process. If that trial succeeds, each later choice of the
+sequence makes one generation of the strategy of this sequence.
 
 With motor noise the reward of the best trial is partly luck, so the targets of the solution are the
-mean of a strategy. The candidates are the last means of all restarts of the strategies of all hand
-sequences. The solution is the candidate whose last complete generation has the lowest mean cost. In
-this mean cost, the cost of a failed trial is the larger of two numbers: twice the ticks that the
-corrective process takes with this hand sequence, and 1 tick more than the worst completed trial of
-the generation.
+mean of a strategy. There is a candidate for each hand sequence and each restart of its strategy:
+the last mean of the strategy. The solution is the candidate whose last complete generation has the
+lowest mean cost. In this mean cost, the cost of a failed trial is the larger of two numbers: twice
+the ticks of the first trial with this hand sequence (in which only the corrective process acts),
+and 1 tick more than the worst completed trial of the generation.
 
 Tuning, with three or four runs for each value:
 
@@ -64,7 +65,7 @@ class BanditParameters(SequenceParameters):
     """Parameters of CMA-ES with a bandit over hand sequences."""
 
     exploration: Annotated[float, Field(ge=0, le=100)] = 0.2
-    """Constant c of UCB1, as a multiple of the range of the first rewards (at least 1 tick)."""
+    """Constant of UCB1, as a multiple of the range of the first rewards (:func:`.spend_trials`)."""
 
 
 class Strategy(Search):
@@ -90,7 +91,7 @@ class Strategy(Search):
         self._failure = -2.0 * self.reward
         self._means: list[tuple[float, Array]] = [(math.inf, self.first_mean)]
         self.evolution: EvolutionStrategy | None = None
-        """The present strategy; None before the first generation."""
+        """The strategy since the last restart; None before the first generation."""
 
     def generation(self) -> None:
         """Make the trials of a generation, and update CMA-ES from their rewards.
@@ -117,11 +118,11 @@ class Strategy(Search):
 
     @property
     def answer(self) -> tuple[float, Array]:
-        """Cost of the best restart of CMA-ES, and the last mean of that restart.
+        """Lowest cost of a restart of CMA-ES, and the last mean of that restart.
 
-        The cost of a restart is the mean cost of its last complete generation (in ticks); the mean
-        has shape ``(n,)``, in length units and rad. Without a complete generation, the cost is
-        infinity, and the mean is the first mean.
+        The first start is counted as a restart. The cost of a restart is the mean cost of its last
+        complete generation (in ticks); the mean has shape ``(n,)``, in length units and rad.
+        Without a complete generation, the cost is infinity, and the mean is the first mean.
         """
         return min(self._means, key=itemgetter(0))
 
@@ -148,10 +149,10 @@ class CMAES(Method):
 
 
 class GoalByGoalParameters(UninformedParameters):
-    """Parameters of CMA-ES that chooses hands goal by goal."""
+    """Parameters of CMA-ES with hands that are chosen goal by goal."""
 
     epsilon: Annotated[float, Field(ge=0, le=1)] = 0.2
-    """Probability of choosing a random hand for a goal."""
+    """ε: probability with which the hand for a goal is chosen at random."""
 
 
 class GoalByGoal(Method):
@@ -173,15 +174,17 @@ class GoalByGoal(Method):
     def solve(self, session: Session) -> Result:
         """Make trials, and return the movements of the best trial.
 
-        With motor noise, return movements to the recommended mean (:func:`recommend`). The method
-        stops in three cases:
+        With motor noise, return movements to the recommended targets (:func:`.recommend`). The
+        details contain the number of the best trial (``best_trial``, from 0) and the number of hand
+        sequences that were tried (``sequences``). The method stops in three cases:
 
         - No trial is left.
         - The corrective process has failed with all hand sequences.
         - ``epsilon`` is 0, and a hand sequence with which the corrective process has failed is
           chosen again.
 
-        Raises MethodError if no trial hits every goal.
+        Raises MethodError if no trial hits every goal, and NotApplicableError if no initial hands
+        are found.
         """
         attempts = Attempts(session, self.parameters.trials)
         letters = sorted(letters_of(session.hands))

@@ -45,20 +45,20 @@ def _sum(weights: list[float]) -> float:
 
 
 class EvolutionStrategy:
-    """Evolution strategy with covariance matrix adaptation (CMA-ES), asked and told by the caller.
+    """CMA-ES (covariance matrix adaptation evolution strategy) with an ask-and-tell interface.
 
-    In each generation, get points from :meth:`ask`, and pass the points and their costs to
-    :meth:`tell`. Stop when :meth:`has_ended` returns True.
+    In each generation, get points from :meth:`ask`, compute their costs, and pass points and costs
+    to :meth:`tell`. Stop when :meth:`has_ended` returns True.
 
     Parameters
     ----------
     mean : ndarray, shape (dim,)
         Mean of the first generation.
     sigma : float
-        Standard deviation of each coordinate in the first generation. (The strategy begins with a
-        value that differs from ``sigma`` by less than 0.01 %.)
+        Standard deviation of each coordinate in the first generation. (As in the package ``cma``,
+        the actual standard deviation is up to 0.005 % larger in some coordinates.)
     size : int
-        Number λ of points in a generation.
+        Number λ of points in a generation, at least 2.
     rng : numpy.random.Generator
         Generator of all random numbers.
 
@@ -113,7 +113,7 @@ class EvolutionStrategy:
         of_points = [c_mu * weight for weight in (*positive, *negative)]
         self._update_weights = np.array([c_1, *of_points])
         self._stalled_weights = np.array([c_1 * (1 - self._c_c * (2 - self._c_c)), *of_points])
-        # Expected length of a standard normal vector.
+        # Expected length of a standard normal vector, approximately if ``dim`` is above 100.
         if dim > 100:
             self._chi_n = dim**0.5 * (1 - 1 / (4 * dim) + 1 / (32 * dim**2))
         else:
@@ -134,14 +134,15 @@ class EvolutionStrategy:
         self._p_c, self._p_sigma = np.zeros(dim), np.zeros(dim)  # evolution paths
         self._generation, self._decomposed_at = 0, 0
         self._moved_to, self._moved_at = self._mean, 0  # last shift of the mean, and its generation
-        self._costs: Array = np.empty(0)  # of the last generation, sorted
+        self._costs: Array = np.empty(0)  # of the last generation, lowest first
         # Histories with the newest entry first: best costs of the last generations, and best and
         # median costs of every fifth generation.
         self._best_costs: deque[float] = deque(maxlen=int(10 + 30 * dim / size))
         self._long_best: deque[float] = deque(maxlen=_HISTORY_LENGTH)
         self._long_median: deque[float] = deque(maxlen=_HISTORY_LENGTH)
         self._best, self._best_point = math.inf, 0  # least cost, and the number of its point
-        self._flat_generations = 0  # in a row whose best cost equals the upper quartile
+        # Length of the present series of generations whose best cost equals the upper quartile.
+        self._flat_generations = 0
 
     @property
     def mean(self) -> Array:
@@ -150,7 +151,7 @@ class EvolutionStrategy:
 
     @property
     def costs(self) -> Array:
-        """Sorted costs of the last generation, shape ``(size,)``.
+        """Costs of the last generation, the lowest first, shape ``(size,)``.
 
         The array is empty before the first :meth:`tell`.
         """

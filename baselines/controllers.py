@@ -4,8 +4,9 @@ A controller makes control steps of at most ``period`` ticks until the hand is i
 cascade (:mod:`coartic.baselines.cascade`) computes each control step: level 1 moves the hand, and
 level 2 chooses among the joint changes that move the hand in this way.
 
-Best-first search over prefixes of hand sequences finds the best hand sequence. A priority queue
-holds the prefixes by their ticks; the prefix with the fewest ticks is extended by the next goal.
+Best-first search over prefixes of hand sequences finds the hand sequence with the fewest ticks. The
+key of the priority queue is the number of ticks of a prefix, so that the prefix with the fewest
+ticks is extended by the next goal.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import beyond_reach, letters_of
 
 _HIT_MARGIN = 1e-9  # in length units: the scorer interpolates along the path, and rounds
-_STALL_STEPS = 50  # a hand is stuck if it comes less than a tenth of a step nearer in so many steps
-_BINDS = 1e-3  # least difference of joint changes at which a level counts as binding
+_STALL_STEPS = 50  # a hand that comes less than a tenth of a step nearer in so many steps is stuck
+_BINDS = 1e-3  # difference of joint changes above which a level binds, in lengths of a control step
 
 
 class Aim(NamedTuple):
@@ -42,7 +43,10 @@ class Aim(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A simulated movement to a goal from the start or the goal before."""
+    """A simulated movement to a goal, which begins at the end of the leg before.
+
+    The first leg begins at the start of the task.
+    """
 
     movement: Movement
     """Movement of kind ``path`` to the goal."""
@@ -51,12 +55,12 @@ class Leg(NamedTuple):
     q: Array
     """Configuration in which the hand hits the goal, shape ``(dof,)``."""
     memory: Any
-    """State of the controller after the last control step; the next leg begins with it."""
+    """Memory of the controller after the last control step (:meth:`Controller.begin`)."""
     steps: NDArray[np.int64]
     """Numbers of control steps, shape ``(3,)``:
 
     - all steps;
-    - steps in which level 1 binds: the changes of level 1 differ from the preferred changes;
+    - steps in which level 1 binds: the changes of level 2 differ from the preferred changes;
     - steps in which level 2 binds: the changes of level 2 differ from the changes of level 1.
     """
 
@@ -100,8 +104,8 @@ class Controller(ABC):
         q : ndarray, shape (dof,)
             Configuration at the beginning of the leg.
         aims : tuple of Aim
-            Goal of the leg with its hand, then the goals ahead with theirs.
-        memory
+            Goal and hand of the leg, then the goals ahead with their hands.
+        memory : object
             Memory at the end of the leg before; None for the first leg.
         """
 
@@ -116,8 +120,8 @@ class Controller(ABC):
         q : ndarray, shape (dof,)
             Configuration before the step.
         aims : tuple of Aim
-            Goal of the leg with its hand, then the goals ahead with theirs.
-        memory
+            Goal and hand of the leg, then the goals ahead with their hands.
+        memory : object
             Memory before the step.
         first : bool
             True for the first step of a leg.
@@ -125,10 +129,10 @@ class Controller(ABC):
         Returns
         -------
         Solution
-            Solution of the cascade. Its changes are multiples of ``self.length``, the largest
+            Solution of the cascade. The unit of its changes is ``self.length``, the largest
             joint-space length of a control step.
         ndarray, shape (joints,)
-            Preferred changes of the joints, as multiples of ``self.length``.
+            Preferred changes of the joints, in the same unit.
         object
             Memory after the step.
         """
@@ -139,10 +143,10 @@ class Controller(ABC):
         Parameters
         ----------
         before : Leg or None
-            The leg to the goal before, at whose end the simulation begins; None to begin at the
+            The leg before. The simulation begins at the end of that leg; for None it begins at the
             start of the task.
         aims : tuple of Aim
-            Goal of the leg with its hand, then the goals ahead with theirs.
+            Goal and hand of the leg, then the goals ahead with their hands.
 
         Returns
         -------
@@ -152,8 +156,8 @@ class Controller(ABC):
         Raises
         ------
         _StuckError
-            The goal is out of reach, or the hand comes less than a tenth of a control step nearer
-            to the goal in 50 control steps.
+            The goal is out of reach, or in 50 control steps the hand comes less than a tenth of the
+            length of a control step nearer to the goal.
         MethodError
             The solver fails.
         """
@@ -197,7 +201,7 @@ class Controller(ABC):
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
         """Solve the cascade, and count the programmes and the iterations of the solver.
 
-        Parameters, returned values and errors are those of :func:`solve_cascade`.
+        Parameters, returned values and errors are those of :func:`.solve_cascade`.
         """
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2
@@ -244,7 +248,7 @@ class ControlParameters(Parameters):
 
 
 class Control(Method):
-    """Base of the methods that simulate a controller for all hand sequences."""
+    """Base class of methods that simulate a controller, and search for the best hand sequence."""
 
     information = KINEMATICS | {Information.REWARD_FORMULA}
     stochastic = False
@@ -263,15 +267,20 @@ class Control(Method):
 
         The search is best-first over prefixes of hand sequences, with a priority queue. The prefix
         with the fewest ticks is extended by the movement to the next goal, until the prefix with
-        the fewest ticks is a complete sequence. Ties are broken by the smaller number of changes of
-        hand, then by the order of the sequences. Hand sequences with a common prefix share the
-        simulation of their movements, as far as the sequences also agree in the hands of the goals
-        ahead.
+        the fewest ticks is a complete sequence. At a tie, the hand sequence with fewer changes of
+        hand comes first, then the first one in alphabetical order. The movement to a goal is
+        simulated once for all sequences that have the same hands up to this goal and at the goals
+        ahead of it.
 
-        The result contains a movement for each goal. The details contain the numbers of hand
-        sequences, of sequences in which a hand got stuck, of simulated movements, of quadratic
-        programmes and of control steps, and for each level the number of control steps in which it
-        binds.
+        The result contains a movement for each goal. The details contain
+
+        - ``sequences``: number of hand sequences;
+        - ``stuck_sequences``: number of sequences in which a hand got stuck during the search;
+        - ``simulated_movements``: number of simulated movements;
+        - ``solves``: number of quadratic programmes solved;
+        - ``control_steps``: number of control steps of the solution;
+        - ``level_1_binds``, ``level_2_binds``: numbers of these control steps in which level 1 and
+          level 2 bind (:attr:`Leg.steps`).
 
         Raises MethodError if a hand gets stuck in all sequences, or if the solver fails.
         """

@@ -2,7 +2,7 @@
 
 The best hands come from the paper's exhaustive strategy (section *Exploration Condition 3*), which
 tries all 2^G hand sequences for G goals and two hands. The corrective process **A** finds each
-target; nothing else is explored.
+target; no targets are explored.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class GivenHands(Method):
         """Make one trial with the task's initial hands, and return the movements of the trial.
 
         Only the corrective process acts in the trial. Raises MethodError if the trial misses a
-        goal.
+        goal, and NotApplicableError if no initial hands are found.
         """
         hands = session.find_initial_hands()
         with session.solving():
@@ -56,8 +56,8 @@ class BestHands(GivenHands):
         """Make a trial with each hand sequence, and return the movements of the best trial.
 
         The sequences are tried in alphabetical order, until the trial budget is used up. The best
-        trial is the one with the highest reward; among trials with equal rewards it is the one with
-        the fewest changes of hand.
+        trial is the one with the highest reward. Among trials with equal rewards, it is the one
+        with the fewest changes of hand, and then the earliest.
 
         Raises MethodError if no trial hits every goal.
         """

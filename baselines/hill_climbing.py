@@ -3,27 +3,28 @@
 Each hand sequence has a centre: a configuration for each goal. In the first trial of a sequence
 only the corrective process **A** acts (parameter ``begin`` can change this). The configurations in
 which this trial hits the goals are the first centre. The targets of each later trial are the centre
-plus Gaussian noise on all explored joints. If the reward of a trial is higher than that of the
-centre, the configurations in which the trial hit the goals become the new centre, as in the
-learner. The method would gain more if the targets of the trial became the new centre: on the
-paper's tasks, random search with 1,000 ``stages`` gains 0 to 16 ticks more with targets than with
-these configurations.
+plus Gaussian noise on all explored joints. The value of a centre is the reward of the trial that
+found it. If a trial has a higher reward, the configurations in which this trial hit the goals
+become the new centre, as in the learner. The method would gain more if the targets of the trial
+became the new centre: on the paper's tasks, random search with 1,000 ``stages`` gains 0 to 16 ticks
+more with targets than with these configurations.
 
-Hands are explored as in the learner: the hands of a trial are those of the best sequence known,
-except that at each goal, with probability ε, a random hand takes the place of the hand. The default
-standard deviation and ε are the learner's; they were not tuned.
+The hands of the first trial are the task's initial hands (parameter ``sequence`` can set the hands
+of all trials). Until a trial has succeeded, the hands of the next trials are random. After that,
+the hands of a trial are those of the best trial so far, but at each goal, with probability ε, the
+hand is replaced by a random hand. The default standard deviation and ε are the learner's; they were
+not tuned.
 
 With ``spread="learned"`` each hand sequence has its own standard deviation σ, which follows the
-one-fifth rule (Beyer and Schwefel 2002). A trial succeeds if it is at least as good as the centre
-around which it was drawn. After every W trials with the sequence
+one-fifth rule (Beyer and Schwefel 2002). A trial succeeds if its reward is at least the value of
+the centre around which it was drawn. After every W trials around centres of the sequence
 
 - σ is multiplied by 1.5 if more than a fifth of the W trials succeeded;
 - otherwise σ is divided by 1.5^(1/4);
 - σ is then clipped to the interval from ``floor`` to 0.3.
 
-With motor noise the value of a centre is the reward of a single trial: the trial whose
-configurations became the centre. The reward of that trial is partly luck. The same bias exists in
-the learner.
+With motor noise the value of a centre, the reward of a single trial, is partly luck. The learner
+has the same bias.
 """
 
 from __future__ import annotations
@@ -54,24 +55,24 @@ _MAX_DRAWN_TRIALS = 128  # largest number of trials that are drawn ahead
 class HillClimbingParameters(SequenceParameters):
     """Parameters of hill climbing.
 
-    The default ``trials`` and ``sigma`` are the learner's; ``begin`` is not.
+    The defaults of ``trials`` and ``sigma`` are the learner's; the default of ``begin`` is not.
     """
 
     begin: Literal["correction", "best"] = "correction"
     """Targets of the first trial of a hand sequence:
 
     - ``"correction"``: there are none; only **A** acts.
-    - ``"best"``: as in the learner's table. Where the sequence has the same hand at a goal and the
-      same hand at the goal before as the best sequence so far, the target is the centre of the best
-      sequence plus noise. At the other goals **A** acts. Until a trial has succeeded, **A** acts at
-      all goals.
+    - ``"best"``: similar to the learner's table. If the sequence and the best sequence so far have
+      the same hand at a goal and the same hand at the goal before, the target for this goal is the
+      centre of the best sequence plus noise. At all other goals **A** acts. Until a trial has
+      succeeded, **A** acts at all goals.
     """
     spread: Literal["fixed", "learned"] = "fixed"
     """``"fixed"`` if the standard deviation is always ``sigma``; ``"learned"`` if it begins with
     ``sigma`` and follows the one-fifth rule."""
     window: Annotated[int, Field(ge=1)] = 100
-    """Number W of trials with a hand sequence after which its spread changes under the one-fifth
-    rule."""
+    """Number W of trials with a hand sequence after which its standard deviation changes under the
+    one-fifth rule."""
     floor: Annotated[float, Field(ge=0, le=0.3)] = 0.03
     """Smallest standard deviation under the one-fifth rule, in length units and rad."""
 
@@ -89,12 +90,13 @@ class HillClimbing(Method):
     def solve(self, session: Session) -> Result:
         """Make trials until none is left, and return the movements of the best trial.
 
-        With motor noise, the movements go to a centre instead: the latest centre of the hand
-        sequence that the best trial used. A centre is the point around which trials are drawn. The
-        method stops early if the corrective process has failed with each hand sequence that it may
-        use (with parameter ``sequence`` there is only one).
+        With motor noise, movements to a centre are returned instead: the latest centre of the hand
+        sequence that the best trial used. A centre consists of the configurations around which
+        trials are drawn. The method stops early if the corrective process has failed with each hand
+        sequence that the method may use (with parameter ``sequence`` there is only one).
 
-        Raises MethodError if no trial hits every goal.
+        Raises MethodError if no trial hits every goal, NotApplicableError if no initial hands are
+        found, and ValueError if parameter ``sequence`` does not fit the task.
         """
         parameters: HillClimbingParameters = self.parameters
         is_learned, window = parameters.spread == "learned", parameters.window
@@ -113,9 +115,9 @@ class HillClimbing(Method):
         def draw() -> str:
             """Draw a hand sequence with which the corrective process has not failed.
 
-            Before the first success all hands are random. Later they are the hands of the best
-            trial, except that at each goal, with probability 0.2, a random hand takes the place of
-            the hand.
+            With parameter ``sequence`` the result is that sequence. Otherwise all hands are random
+            before the first success. After the first success they are the hands of the best trial,
+            but at each goal, with probability 0.2, the hand is replaced by a random hand.
             """
             if given is not None:
                 return given
@@ -130,7 +132,7 @@ class HillClimbing(Method):
         def adapt(hand_sequence: str, is_good: bool) -> None:
             """Count a trial with a hand sequence, and adapt its spread by the one-fifth rule.
 
-            ``is_good`` is True if the trial is at least as good as its centre.
+            ``is_good`` is True if the reward of the trial is at least the value of its centre.
             """
             since[hand_sequence] += 1
             good[hand_sequence] += is_good
@@ -157,8 +159,8 @@ class HillClimbing(Method):
             while attempts.left > 0 and len(hopeless) < sequences:
                 # Draws do not depend on rewards until a centre moves, which is rare, or a spread
                 # changes. So trials are drawn ahead and made side by side, up to the end of a
-                # window. After a trial that moves a centre, the draws beyond it are discarded, and
-                # the generator goes back to its state after the trial.
+                # window. If a trial moves a centre, the later draws are discarded, and the
+                # generator is set back to its state after the draws of this trial.
                 drawn, noise, states = list[str](), list[Array](), [rng.bit_generator.state]
                 while len(drawn) < min(ahead, attempts.left):
                     hand_sequence = draw() if attempts.trials_made else initial_hands

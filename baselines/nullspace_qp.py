@@ -8,10 +8,10 @@ The task of level 1 is::
     J x = v J J⁺ u,  that is  A = (J; -J),  b = A v J⁺ u,      v = min(1 / |J⁺ u|, d)
 
 Here u is the unit vector from the hand to the centre, d is the distance from the hand to the
-centre, and v is the speed of the hand. Lengths are in units of the largest joint-space length of a
-control step. The speed v is that of the minimum-norm change of length 1 in the direction u, but at
-most d, with which the hand would arrive at the centre. If the change that level 2 chooses is longer
-than 1, it is scaled down to length 1: the hand still goes straight, but slower.
+centre, and v is the speed of the hand (its way in one control step). The unit of lengths is the
+largest joint-space length of a control step. The speed v is the way that the hand makes in the
+direction u by a minimum-norm change of length 1, but at most d. If the change that level 2 chooses
+is longer than 1, it is scaled down to length 1: the hand still goes straight, but slower.
 
 Level 2 chooses the joint change x that is nearest to a preferred change:
 
@@ -20,14 +20,15 @@ Level 2 chooses the joint change x that is nearest to a preferred change:
   is the difference between that posture and the present configuration, divided by the number of
   control steps to the current goal, but no longer than a control step. When a goal becomes current,
   the corrective process finds the posture of the next goal, starting from the configuration of the
-  robot.
+  robot. If it finds none, or if there is no next goal, the configuration in which the goal became
+  current takes the place of the posture.
 
-Where neither the limits of the joint changes nor damping matter, this is the null-space projection
-x = v J⁺ u + (I − J⁺ J) z of the preferred change z.
+Where neither the limits of the joint changes nor damping matter, x = v J⁺ u + (I − J⁺ J) z: the
+preferred change z is projected onto the null space of J.
 
 Sources: Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987), Task-priority based redundancy control of
-robot manipulators; O. Kanoun, F. Lamiraux, P.-B. Wieber (2011); with the next goal as the objective
-of lower priority: K. Rohanimanesh et al. (2004), B. Thibodeau et al. (2004).
+robot manipulators; O. Kanoun, F. Lamiraux, P.-B. Wieber (2011). In K. Rohanimanesh et al. (2004)
+and B. Thibodeau et al. (2004), the next goal is the objective of lower priority.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class HandController(Controller):
     """
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Return ``q`` as the memory, which this class does not use."""
+        """Return ``q`` as the memory. This class does not use the memory."""
         return q
 
     def step(
@@ -80,12 +81,12 @@ class HandController(Controller):
         memory : ndarray, shape (dof,)
             Memory of the controller.
         steps : float
-            Number of control steps to the goal.
+            Estimated number of control steps to the goal, at least 1.
 
         Returns
         -------
         ndarray, shape (joints,)
-            Preferred changes, in units of the largest joint-space length of a control step.
+            Preferred changes. The unit is the largest joint-space length of a control step.
         """
         return np.zeros(len(self.moving))
 
@@ -100,9 +101,9 @@ class NextGoalController(HandController):
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
         """Find a posture of the next goal, shape ``(dof,)``, and return it as the memory.
 
-        The corrective process starts from ``q`` and tries the goals ahead in order. The memory is
-        the posture of the first goal for which the process converges, or ``q`` if the process
-        converges for none of the goals.
+        The corrective process tries the goals ahead in order, and starts from ``q`` for each of
+        them. The memory is the posture of the first goal for which the process converges. If it
+        converges for none of the goals, or if there are no goals ahead, the memory is ``q``.
         """
         for hand, goal in aims[1:]:
             correction = self.session.correct(q, hand, goal + 1)
@@ -113,9 +114,9 @@ class NextGoalController(HandController):
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
         """Return the change towards the posture that is due in one control step.
 
-        The result is the change from ``q`` to the posture ``memory``, divided by the number of
-        control steps to the goal (at least 1). A change whose norm exceeds 1 is scaled to norm 1.
-        Parameters, shapes and units are those of :meth:`HandController.preferred`.
+        The result is the change from ``q`` to the posture ``memory``, divided by ``steps``. If its
+        norm exceeds 1, the result is scaled to norm 1. Parameters, shapes and units are those of
+        :meth:`HandController.preferred`.
         """
         path = (memory - q)[self.moving] / self.length
         return np.asarray(path / max(steps, float(np.linalg.norm(path)), 1.0))

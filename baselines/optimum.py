@@ -1,33 +1,38 @@
 """The search for the optimum: the best reward that a global search finds.
 
-A trial without motor noise loses reward in proportion to the length of its path in joint space. So
-``optimum/search`` searches, over all hand sequences, for the path that touches the discs of all
-goals in their order and is shortest in the Euclidean norm:
+Without motor noise, the ticks of a trial are its path length in control steps, rounded up for each
+movement, plus one tick for each movement. So ``optimum/search`` searches for the path in joint
+space that touches the discs of all goals in their order and is shortest in the Euclidean norm (with
+the weight of the base). It searches over all hand sequences if there are at most 64; otherwise a
+beam search selects 64 sequences in each graph. The search has three steps:
 
 1. Dynamic programming finds the shortest paths through graphs of sampled postures
    (:mod:`coartic.baselines.posture_graph`).
 2. IPOPT shortens each of these paths to a local minimum
    (:mod:`coartic.baselines.trajectory_problem`).
-3. The best paths are rounded to whole control ticks (:mod:`coartic.baselines.whole_ticks`). In some
-   roundings there is no movement to a goal, because the hand is already inside the goal when the
-   goal becomes current.
+3. The shortest path of each hand sequence is rounded to whole control ticks
+   (:mod:`coartic.baselines.whole_ticks`), unless the sequence cannot give fewer ticks than the best
+   rounding so far. In some roundings there is no movement to a goal, because the hand is already
+   inside the goal when the goal becomes current.
 
-The method is the reference for the gaps of all other methods, not a competitor. The study
-``studies/optima`` proves bounds on the optima. ``trajectory-optimisation/path-length`` searches for
-the same paths from other graphs and starts.
+The method is not a competitor: its solutions are among those from which the best known reward of a
+task, the reference of all gaps, is chosen. The study ``studies/optima`` proves bounds on the
+optima. ``trajectory-optimisation/path-length`` searches for the same paths from other graphs and
+starts.
 
-``optimum/in-model`` searches in any world. With motor noise the shortest path is not the best
-solution; and in the maximum norm, the path that is shortest in the Euclidean norm is not the
-shortest. So CMA-ES varies the targets of the movements to minimise the mean ticks, from two starts:
+``optimum/in-model`` searches under any motion model. With motor noise the shortest path is not the
+best solution. In the maximum norm, the path that is shortest in the Euclidean norm is usually not
+the shortest. So CMA-ES varies the targets of the movements to minimise the mean ticks, from two
+starts:
 
-- the path that ``optimum/search`` finds (in the maximum norm with Euclidean lengths);
+- the path that ``optimum/search`` finds (which minimises Euclidean lengths under every norm);
 - the postures that the corrective process reaches with its best hands.
 
 With motor noise, all solutions of a generation are executed with the same 100 noise draws (*common
 random numbers*), and each generation has new draws. The start and the results of each search are
 then compared on 1,000 draws with another noise seed, which no generation has used. The solution
-with the fewest mean ticks on these draws is the best known solution in this world; nothing proves
-that it is the optimum.
+with the fewest mean ticks on these draws is returned; nothing proves that it is the optimum. (100
+is the default of parameter ``executions``, and the comparison uses ten times as many draws.)
 """
 
 from __future__ import annotations
@@ -71,9 +76,9 @@ from coartic.robot import Array, Configs
 from coartic.tasks.task import letters_of
 
 _STEP_SIZE = 0.02  # first step size of CMA-ES, in length units (base) and rad (joints)
-_SEARCH = 0x73656172  # key of the worlds in which the search executes solutions
-_JUDGED = 10  # times as many executions judge a solution as find it
-MAX_KEPT = 64  # hand sequences whose shortest paths are stored with the solution
+_SEARCH = 0x73656172  # key by which the noise seeds of the search are derived
+_JUDGED = 10  # executions in the final comparison, as a multiple of parameter executions
+MAX_KEPT = 64  # largest number of hand sequences whose path lengths are stored with the solution
 
 
 class OptimumParameters(Parameters):
@@ -114,6 +119,15 @@ class OptimumSearch(Method):
         """Search for the movements with the fewest ticks, and return them.
 
         In each posture graph, at most 64 hand sequences are searched, which a beam search selects.
+        The details contain
+
+        - ``path_length``: length of the shortest path before rounding, in a mix of length units and
+          rad;
+        - ``path_lengths``: dict that maps hand sequences to the lengths of their shortest paths, at
+          most 64, the shortest first;
+        - ``solves``, ``failed_solves``: number of starts of IPOPT, and how many did not converge;
+        - ``sequences_planned``: number of hand sequences for which a path was found.
+
         Raises MethodError if no movements that hit every goal are found, or if the task is not
         valid with the locks of parameter ``base``.
         """
@@ -188,12 +202,14 @@ class InModelParameters(Parameters):
     """Number of solutions that CMA-ES tries from each start. The last generation is completed, so
     that the number can be slightly larger."""
     executions: Annotated[int, Field(ge=1, le=10_000)] = 100
-    """With motor noise, the number of executions of each solution that CMA-ES tries. The start and
-    the results of each search are compared over ten times as many executions."""
+    """With motor noise, the number of executions of each solution that CMA-ES tries; the start and
+    the results of each search are compared over ten times as many executions. Without motor noise
+    each solution is executed once."""
     nodes: Nodes = 200
     graphs: Count = 3
     chains: Count = 100
-    """Effort of the search for the shortest path, as for ``optimum/search``."""
+    """``nodes``, ``graphs`` and ``chains``: effort of the search for the shortest path
+    (:class:`OptimumParameters`)."""
 
 
 class _Start(NamedTuple):
@@ -201,8 +217,8 @@ class _Start(NamedTuple):
 
     hands: str
     targets: Configs
-    """Targets, shape ``(G, dof)``, in length units and rad. NaN for joints that are not explored,
-    and in whole rows for goals that take no movement."""
+    """Targets, shape ``(G, dof)``, in length units and rad. Entries of joints that are not explored
+    are NaN, and so are all entries of a goal to which there is no movement."""
     ticks: int
     """Ticks of the solution without noise."""
 
@@ -232,10 +248,11 @@ class InModel(Method):
         The details map the name of each start to a dict with three entries: the hand sequence
         (``hands``), and the mean ticks of the start itself (``start``) and of the best solution
         that was found from it (``end``). Both means are over the noise draws of the final
-        comparison.
+        comparison; without motor noise they are the ticks of one execution.
 
-        Raises MethodError if ``optimum/search`` finds no path, and the corrective process completes
-        the task with no hand sequence.
+        Raises MethodError if neither start exists: ``optimum/search`` finds no path, and
+        :func:`.best_hands` finds no hand sequence with which the corrective process completes the
+        task.
         """
         task, noise = session.reveal(*self.information), session.model.motor_noise
         executions = self.parameters.executions if noise else 1
@@ -290,8 +307,8 @@ class InModel(Method):
 def _postures(session: Session, task: Task) -> _Start | None:
     """Return the postures of the corrective process with its best hands as a start.
 
-    The hands are those of :func:`.best_hands`. The result is None if the process completes the task
-    with no hand sequence.
+    The hands are those of :func:`.best_hands`. The result is None if :func:`.best_hands` returns
+    None.
     """
     best = best_hands(task, session.model)
     if best is None:
@@ -345,7 +362,7 @@ def mean_ticks_in(session: Session, task: Task, start: _Start, worst: int, seed:
 
     A point is a vector of the entries of the targets that are not NaN in the start
     (:func:`with_entries`). In one call of the function, all points are executed with the same noise
-    draws. No session uses the seed of these draws.
+    draws. The seed of these draws differs from the noise seeds of sessions and of scoring.
 
     Parameters
     ----------

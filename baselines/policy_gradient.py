@@ -23,9 +23,9 @@ advantages A of the trials::
   update, b and d move by a tenth of the difference towards the values of the batch, for which
   |R - b| is computed with the old b.
 - Without the bounds on A, a single bad batch can move the policy far away.
-- The reward of a failed trial is replaced by the worst reward of all batches so far, less one tick.
-  Until a trial of a batch has hit every goal, it is replaced by minus twice the ticks of the
-  corrective process.
+- The reward of a failed trial is replaced by a lower value: the lowest reward of a completed trial
+  of all batches so far, minus 1. Before any trial of a batch has been completed, the value is minus
+  twice the ticks of the first trial, in which only the corrective process acts.
 - An incomplete last batch does not change the policy.
 
 With ``spread="fixed"`` ν does not change.
@@ -37,7 +37,7 @@ its solutions take 23 % more ticks than those with the bandit (geometric means o
 in the four families with two arms).
 
 With motor noise the targets of the solution are the mean m of one hand sequence: the sequence whose
-last complete batch has the best mean reward.
+last complete batch has the highest mean reward.
 """
 
 from __future__ import annotations
@@ -60,7 +60,8 @@ _CLIP = 3.0  # largest advantage
 _RATE = 0.1  # of the running means b and d, for each batch
 _LOG_BOUNDS = math.log(0.005), math.log(0.3)  # of a learned spread, in length units and rad
 _TUNED = {"learned": (25, 2.0, 0.1), "fixed": (25, 1.0, 0.0)}
-"""Defaults of ``batch``, ``step`` and ``spread_step``, by ``spread``."""
+"""Dict that maps each value of ``spread`` to the defaults of ``batch``, ``step`` and
+``spread_step``."""
 
 
 class PolicyGradientParameters(SequenceParameters):
@@ -80,7 +81,7 @@ class PolicyGradientParameters(SequenceParameters):
 
     @property
     def steps(self) -> tuple[int, float, float]:
-        """The batch size B, and the step sizes α and β; β is 0 if the spread is fixed."""
+        """Batch size B, and step sizes α and β (0 for a fixed spread)."""
         batch, step, spread_step = _TUNED[self.spread]
         if self.spread == "learned":
             spread_step = self.spread_step or spread_step
@@ -116,15 +117,15 @@ class Policy(Search):
         self.log_spread = np.full(len(self.mean), math.log(parameters.sigma))
         """Logarithm of the standard deviation of each target, shape ``(n,)``."""
         self._failure = 2.0 * self.reward  # value of a failed trial
-        self._worst = math.inf  # reward of the trials of batches
+        self._worst = math.inf  # lowest reward of a completed trial of all batches
         self._baseline = self._scale = math.nan  # b and d
         self._cost = math.inf
 
     def generation(self) -> None:
         """Make the trials of a batch, and update mean and spread by the policy gradient.
 
-        If fewer trials are left than belong to a batch, only the trials that are left are made, and
-        nothing is updated.
+        If fewer trials are left than belong to a batch, only these trials are made, and mean and
+        spread are not updated.
         """
         z = self._rng.standard_normal((self._batch, len(self.mean)))
         spread = exp(self.log_spread)
@@ -151,9 +152,9 @@ class Policy(Search):
 
     @property
     def answer(self) -> tuple[float, Array]:
-        """Mean cost of the last complete batch in ticks, and the mean of the policy.
+        """Mean cost of the last complete batch (in ticks), and the mean of the policy.
 
-        Without a complete batch the cost is infinity.
+        Without a complete batch the cost is infinity, and the mean is the first mean.
         """
         return self._cost, self.mean
 

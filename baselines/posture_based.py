@@ -8,15 +8,16 @@ to that posture:
    the corrected postures whose hand is at the goal, the planner retrieves the one with the lowest
    travel cost.
 2. *Instance generation.* Until a deadline, the planner generates random postures near the retrieved
-   one (*diffusion*). These postures are corrected and evaluated in the same way as stored postures.
-   The feedforward correction improves the accuracy of the postures (Rosenbaum, Loukopoulos,
-   Meulenbroek, Vaughan & Engelbrecht 1995).
+   one (*diffusion*). These postures are corrected by the same kind of steps as stored postures, and
+   evaluated by the same travel cost. The feedforward correction improves the accuracy of the
+   postures (Rosenbaum, Loukopoulos, Meulenbroek, Vaughan & Engelbrecht 1995).
 3. *Simulation.* An internal simulation computes where the movement will end. The planned postures
    are added to the stored postures.
 
-With a horizon of two goals, the travel cost includes the path from the posture to a posture at the
-next goal. Only the first movement is made; the posture at the next goal is planned again when the
-first goal is hit. The authors name anticipation as an extension (1995); this form of it is ours.
+With a horizon of two goals, the travel cost includes the path from the posture at the current goal
+to a posture at the next goal. Only the movement to the current goal is made. When this goal is hit,
+the posture at the next goal is planned again. The authors name anticipation as an extension (1995);
+this form of anticipation is ours.
 
 The method differs from the theory in these points:
 
@@ -24,9 +25,9 @@ The method differs from the theory in these points:
   theory each joint has its own expense factor.
 - The constraint hierarchy has two levels (accuracy, then travel cost), because there are no
   obstacles.
-- At first the stored postures are random postures of the arms around the start. The base is placed
-  so that the hand is at the goal.
-- The generated postures are drawn around a weighted sum of the better postures (the rule of 1995),
+- At first the stored postures are random postures of the arms around the start. For each goal, the
+  base is moved so that the hand is at the goal.
+- The generated postures are drawn around a weighted mean of the better postures (the rule of 1995),
   with a standard deviation that falls until the deadline. So the search converges.
 - The hand is chosen together with the posture.
 """
@@ -79,7 +80,7 @@ class PostureBasedParameters(Parameters):
     """
 
     stored: Annotated[int, Field(ge=0, le=2000)] = 300
-    """Number of random postures that are stored at first, in addition to the starting posture."""
+    """Number of random postures that the planner stores at first, besides the starting posture."""
     rounds: Annotated[int, Field(ge=0)] = 60
     """Number of rounds of generation for each goal. The end of the last round is the deadline."""
 
@@ -97,8 +98,9 @@ class PostureBased(Method):
     def solve(self, session: Session) -> Result:
         """Plan the movements to the goals one after the other, and return them.
 
-        The details contain the expected ticks of each movement. Raises MethodError if no stored
-        posture can be corrected so that a hand is at a goal.
+        The details contain a list with the expected ticks of each movement (``expected_ticks``).
+        Raises MethodError if for some goal no stored posture can be corrected so that a hand is at
+        the goal.
         """
         with session.building():
             planner = PosturePlanner(session, self.parameters, self.horizon)
@@ -152,8 +154,8 @@ class PosturePlanner:
         self.horizon = horizon
         self.robot = session.reveal(Information.FORWARD_KINEMATICS, Information.JACOBIAN).robot
         self.goals = session.goals
-        # A target this near to the goal's centre, the radius less the arrival tolerance, is hit
-        # before the movement arrives.
+        # If the target brings the hand within the radius minus the arrival tolerance of the goal's
+        # centre, the movement hits the goal before it arrives.
         arrival, _ = session.model.tolerances(session.radius)
         self.tolerance = session.radius - arrival
         self.base_and_arm = {hand: np.zeros(session.dof, bool) for hand in session.hands}
@@ -187,7 +189,7 @@ class PosturePlanner:
         Raises
         ------
         MethodError
-            No stored posture can be corrected so that a hand is at the goal.
+            For some goal, no stored posture can be corrected so that a hand is at the goal.
         """
         movements, ticks, step = [], [], self.session.model.step
         for goal in range(len(self.goals)):
@@ -315,7 +317,7 @@ class PosturePlanner:
         costs = _path_length(self.q, best)
         for number, sd in enumerate(_FIRST_SD * np.geomspace(1.0, _LAST_SD, self.rounds)):
             noise = sd * noises[:, number]
-            noise[:, 0] = 0.0  # the weighted sum itself is evaluated, too
+            noise[:, 0] = 0.0  # the weighted mean itself is evaluated, too
             postures = centre[:, None] + noise
             # Postures are corrected goal by goal. The arm that is not chosen does not move.
             accurate = np.ones(postures.shape[:2], bool)
@@ -359,7 +361,8 @@ class PosturePlanner:
         Returns
         -------
         ndarray of bool, shape (...)
-            True for each posture whose hand is now within ``self.tolerance`` of the goal's centre.
+            True for each posture in which the hand is now within ``self.tolerance`` of the goal's
+            centre.
         """
         flat = postures.reshape(-1, postures.shape[-1])
         arm = self.robot.arm(hand)
@@ -398,27 +401,27 @@ def _linearise_far(
     xs: Any,
     ys: Any,
 ) -> int:
-    """Linearise the hand's position in postures in which it is far from (x, y).
+    """Find postures in which a hand is far from (x, y), and linearise its position.
 
     Parameters
     ----------
     postures : ndarray, shape (N, dof)
         Postures, in length units and rad.
     far : ndarray of int, shape (F,)
-        Indices of the postures to look at. Indices of postures in which the hand is farther than
-        ``tolerance`` from (x, y) are moved to the beginning, in place.
+        Indices of the postures to look at. The indices of the postures in which the hand is farther
+        than ``tolerance`` from (x, y) are written to the beginning of this array, in order.
     arm : Arm
         Arm of the hand, with n links.
     x, y : float
         Centre of the goal, in length units.
     tolerance : float
-        Distance, in length units.
+        Distance above which a hand is far from (x, y), in length units.
     wanted : ndarray, shape (F, 2, 1)
-        Entry k is set to the step of the hand towards (x, y) in posture ``far[k]``, at most 0.5
-        length units long.
+        Entry k is set to the step that the hand is to make towards (x, y) in the k-th of these
+        postures, at most 0.5 length units long.
     jacobian : ndarray, shape (F, 2, dof)
         In entry k, the columns of the joints of the arm are set to the derivatives of the hand's
-        position in posture ``far[k]``. The columns of the base do not change.
+        position in the k-th of these postures. Other columns do not change.
     xs, ys : ndarray, shape (n + 1,)
         Work space.
 

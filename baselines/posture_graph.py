@@ -5,7 +5,8 @@ inside the disc of the goal. The cost of an edge is the joint-space length of th
 node to the next. A movement moves the base and the arm that hits the goal; the other arm stays in
 the posture in which it was last used. So the state at a goal is a pair of nodes, one for each arm.
 For each hand sequence, dynamic programming over the prefixes of the sequence finds the shortest
-path through the layers exactly. Such a path, with a node for each goal, is called a *chain*.
+path through the layers exactly. Such a path, with a node for each goal, is called a *chain*. For
+tasks with many hand sequences, a beam search selects the sequences (:data:`BEAM_WIDTH`).
 
 A planner uses the chains as starts of a local search by IPOPT
 (:mod:`coartic.baselines.trajectory_problem`).
@@ -27,14 +28,14 @@ from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Task
 
 KINEMATICS = frozenset({Information.GOALS, Information.FORWARD_KINEMATICS, Information.JACOBIAN})
-"""Information on goals and hands that all planners use."""
+"""Information on goals and positions of hands that all planners and controllers use."""
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
 """A chain: a hand sequence, and the configurations at the goals, shape ``(G, dof)``."""
 Layers = dict[tuple[int, Hand], Array]
 """Dict that maps each pair of goal (from 0) and hand to its nodes, shape ``(n, dof)``."""
 Nodes = Annotated[int, Field(ge=10, le=1000)]
-"""Type of a parameter: number of samples for each pair of goal and hand, from 10 to 1000."""
+"""Type of a parameter: number of samples in a posture graph, from 10 to 1000."""
 Count = Annotated[int, Field(ge=1)]
 """Type of a parameter: number of graphs, chains or starts, at least 1."""
 BEAM_WIDTH = 64
@@ -105,30 +106,31 @@ def _sample_postures(
 class PrefixCosts(NamedTuple):
     """Table of dynamic programming for one prefix of hand sequences.
 
-    The state is a pair of last nodes: the node at which the left hand was last used, and the node
-    at which the right hand was last used. For each pair, the table contains the cost of the
-    cheapest path through the layers of the prefix that ends in these two nodes.
+    The state is a pair of nodes: the last node of the left hand, and the last node of the right
+    hand. For each pair, the table contains the cost of the cheapest path through the layers of the
+    prefix that ends in this pair.
     """
 
     hands: HandSequence
+    """The prefix: the hand of each of its goals."""
     nodes: dict[Hand, Array]
     """Dict that maps each hand to the nodes of the layer in which the hand was last used, shape
-    ``(n, dof)``. For a hand that was not used yet, the only node is the start."""
+    ``(n, dof)``. For a hand that the prefix does not use, the only node is the start."""
     cost: Array
     """``cost[i, j]`` is the joint-space length of the shortest path whose last nodes are node i of
     the hand used last and node j of the other hand."""
     predecessors: tuple[NDArray[np.int32], ...]
-    """Predecessors on the cheapest paths, an array for each goal of the prefix. Node i is a node of
-    the hand at this goal, and node j a node of the other hand. Entry ``[i, j]`` is the index of the
-    node of the hand at this goal that comes before node i on the cheapest path to the pair
-    (i, j)."""
+    """Predecessors on the cheapest paths: a tuple with an array for each goal of the prefix. Let h
+    be the hand at this goal. Entry ``[i, j]`` belongs to node i of hand h at this goal, and to last
+    node j of the other hand. The entry is the index of the node at which hand h was last used
+    before this goal, on the cheapest path to this pair of nodes."""
 
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
     """Sample the nodes of a posture graph for each goal and hand.
 
     A node is a posture in which the hand is inside the goal's disc. Each sample begins with a
-    random configuration, which is then corrected until the hand is inside the disc. If the goal
+    random configuration, from which Gauss-Newton steps move the hand into the disc. If the goal
     before has nodes, of either hand, half of the random configurations are drawn around these
     nodes. All other random configurations are drawn around the task's start.
 
@@ -136,7 +138,8 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
     ----------
     task : Task
     count : int
-        Number of samples for each pair of goal and hand. Samples that miss the goal are left out.
+        Number of samples for each pair of goal and hand. Samples whose hand does not come into the
+        disc are left out.
     rng : numpy.random.Generator
 
     Returns
@@ -172,8 +175,9 @@ def chains_of(
     layers : dict
         Dict that maps each pair of goal (from 0) and hand to its nodes, shape ``(n, dof)``.
     most : int, optional
-        Width of a beam search over the goals. At each goal, only this number of prefixes of hand
-        sequences, the cheapest ones, are extended. By default all prefixes are extended.
+        Width of a beam search over the goals: at each goal, only this number of prefixes of hand
+        sequences, the cheapest ones, are kept. So there are at most this number of chains. By
+        default all prefixes are kept.
     base_weight : float
         Weight of the base in the length of a movement (:class:`.MotionModel`).
 
@@ -211,10 +215,11 @@ def chains_of(
 def _extend(
     task: Task, layers: Layers, begun: PrefixCosts, base_weight: float
 ) -> Iterator[PrefixCosts]:
-    """Extend a prefix of a hand sequence by one goal, with each hand that has nodes at the goal.
+    """Extend a prefix by the next goal, with each hand that has nodes there.
 
-    ``begun`` contains the costs of the prefix. Yields the costs of each longer prefix, first that
-    with the left hand. ``layers`` and ``base_weight`` are as in :func:`chains_of`.
+    ``begun`` contains the costs of the prefix of hand sequences. Yields the costs of each longer
+    prefix, the one with the left hand first. ``layers`` and ``base_weight`` are as in
+    :func:`chains_of`.
     """
     hands, nodes, cost, predecessors = begun
     goal = len(hands)
@@ -248,7 +253,7 @@ def cheapest_chains(
     most: int = BEAM_WIDTH,
     spread: bool = False,
 ) -> Iterator[Chain]:
-    """Sample random posture graphs, and yield the cheapest chain of each hand sequence.
+    """Sample posture graphs, and yield the cheapest chain of each hand sequence in each graph.
 
     Parameters
     ----------
@@ -264,7 +269,7 @@ def cheapest_chains(
         Smallest number of chains over all graphs. More than ``graphs`` graphs are made until this
         number of chains is reached.
     most : int
-        Largest number of hand sequences in a graph (:func:`chains_of`).
+        Largest number of hand sequences with a chain in a graph (:func:`chains_of`).
     spread : bool
         True to yield, after each chain of a task for two hands, a copy in which the idle arm moves
         in equal steps (:func:`move_other_arm`). These copies are not counted in the number
@@ -304,10 +309,10 @@ def cheapest_chains(
 def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
     """Return a copy of a chain in which idle arms move towards their next posture.
 
-    In a chain, an arm moves only on the way to the goals that its hand hits. In the copy, the
-    change of the arm from one of these goals (or from the start) to the next of these goals is
-    divided into equal changes, one for each goal on the way. After the last goal that its hand
-    hits, an arm does not move.
+    In a chain, an arm moves only on the way to the goals that its hand hits. In the copy, an arm
+    moves in equal steps, one for each goal, from its posture at one of these goals (or at the
+    start) to its posture at the next of these goals. After the last goal that its hand hits, an arm
+    does not move.
 
     Parameters
     ----------

@@ -2,8 +2,8 @@
 
 A goal posture is a configuration in which the hand is in its goal. Unlike null-space control
 (:mod:`coartic.baselines.nullspace_qp`), this controller mainly plans postures. The priority of the
-hand rarely binds, because the joints prefer to go straight to a posture that hits the goal anyway.
-The ``details`` of a run count the control steps in which the priority binds.
+hand rarely binds, because the joints already go straight to a posture in which the hand is in its
+goal. The ``details`` of a run count the control steps in which each level binds.
 
 The controller stores a **posture** for the current goal and for each goal ahead. The cascade of two
 quadratic programmes (:mod:`coartic.baselines.cascade`) computes both the changes of the postures
@@ -17,16 +17,17 @@ Here p(q) is the position of the hand, J its Jacobian, c the centre of the disc,
 of the polygon's sides and ρ is the distance of the sides from c.
 
 - *Postures.* The disc is that of the goal. The preferred configurations are chosen so that the path
-  through the postures becomes shorter; its length is that of the reward (Euclidean in joint space).
-  The postures converge to a local minimum.
-- *Control steps.* The disc is centred on the goal. Its radius shrinks from the present distance of
-  the hand to the radius of the goal. The preferred configuration lies on the straight line to the
-  posture. So the hand comes nearer to the goal with each control step, and otherwise the joints
-  move as they prefer.
+  through the postures becomes shorter. Like the reward, the length of the path is Euclidean in
+  joint space. The postures converge to a local minimum.
+- *Control steps.* The disc is centred on the goal. Its radius is a little smaller than the present
+  distance of the hand from the centre, so that the disc shrinks with each control step. The
+  preferred configuration lies on the straight line to the posture. So the hand comes nearer to the
+  goal with each control step, and otherwise the joints move as they prefer.
 
-An iterative descent finds each posture once. After that, the postures are improved by one iteration
-in each control step, except the first control step to a goal. The two methods differ in the
-objective of the posture for the current goal:
+An iterative descent finds each posture once. When a goal becomes current, and goals ahead are
+considered, all postures are then moved until the path through them no longer becomes shorter. In
+each control step except the first one to a goal, the postures are improved by one further
+iteration. The two methods differ in the objective of the posture for the current goal:
 
 - ``current-goal``: the posture that is nearest to the robot's configuration;
 - ``goals-ahead``: the posture that makes the path through the postures of this goal and the next
@@ -37,11 +38,11 @@ one-armed, two-armed and aligned): 12 settings of the controller and, before tha
 of a prototype. Three numbers were varied, one at a time:
 
 - *Least speed.* Lower bound on the speed with which the hand comes nearer to the goal, as a
-  fraction of the speed with which it would come there evenly, in the number of control steps that
+  fraction of a constant speed: that with which the hand would arrive after as many control steps as
   the joints need for the straight line to the posture.
 - *Weight of the next segment.* Each posture minimises a weighted sum of the lengths of two segments
-  of the path: the segment from the configuration before to the posture has weight 1, and the
-  segment from the posture to the next posture has this weight.
+  of the path. The segment from the posture before (or from the robot's configuration) to the
+  posture has weight 1, and the segment from the posture to the next posture has this weight.
 - *Goals ahead.* Number of goals after the current goal whose postures are part of the path.
 
 The table shows, for each value, the mean gap of ``goals-ahead`` to the best known path. A star
@@ -79,7 +80,7 @@ and the rim of the disc is at most 2 % of the radius."""
 _FACE_NORMALS = directions(2 * np.pi * np.arange(FACES) / FACES)
 _INSET = float(directions(np.pi / FACES)[0])
 _MARGIN = 1e-4  # in length units: the hand never reaches the polygon, but enters the disc
-_CLOSING = 0.03  # least speed of the hand towards the goal, as a share of even speed
+_CLOSING = 0.03  # least speed of the hand towards the goal, as a share of the constant speed
 _POSTURE_STEPS = 400  # largest number of steps of a search for a posture
 _POSTURE_STEP = 0.1  # longest of these steps, in length units and rad: longer steps end far away
 _POSTURE_GAIN = 0.5  # share of the path to the preferred posture in a step: 1 may oscillate
@@ -90,9 +91,9 @@ _SHORTEST = 0.02  # shorter paths get the weight of this length, in length units
 class PostureController(Controller):
     """Go straight in joint space to a posture that hits the current goal.
 
-    An aim is a goal with its hand. The memory of the controller is a dict that maps the aims for
-    the current goal and for the goals ahead to their postures, each of shape ``(dof,)``, in length
-    units (base) and rad (joints).
+    An aim is a pair of a hand and a goal. The memory of the controller is a dict that maps the aim
+    for the current goal, and the aim for each goal ahead, to a posture of shape ``(dof,)``, in
+    length units (base) and rad (joints).
     """
 
     def begin(
@@ -106,8 +107,9 @@ class PostureController(Controller):
         2. If there is more than one aim, all postures are then moved to shorten the path from ``q``
            through the postures (:meth:`sweep`).
 
-        Each descent ends after at most 400 steps, and so does the shortening of the path. If one of
-        them has not converged by then, a posture may miss its goal.
+        Each descent ends after at most 400 steps, and the shortening of the path after at most 400
+        calls of :meth:`sweep`. If one of them has not converged by then, a posture may miss its
+        goal.
 
         Parameters
         ----------
@@ -162,10 +164,10 @@ class PostureController(Controller):
         """Shorten the path from ``q`` through all postures, by one step of each posture.
 
         Each posture makes a step towards a preferred posture (:meth:`step_nearer`). The preferred
-        posture is the mean of the two neighbours of the posture on the path, each weighted by the
-        inverse of its distance from the posture (Weiszfeld's algorithm, 1937). The neighbour before
-        the first posture is ``q``. The last posture has only one neighbour, which is its preferred
-        posture.
+        posture is the weighted mean of the two neighbours of the posture on the path; the weight of
+        a neighbour is the inverse of its distance from the posture, where distances below 0.02 are
+        replaced by 0.02 (Weiszfeld's algorithm, 1937). The neighbour before the first posture is
+        ``q``. The last posture has only one neighbour, which is its preferred posture.
 
         Parameters
         ----------
@@ -179,7 +181,7 @@ class PostureController(Controller):
         Returns
         -------
         float
-            Length of the longest of the steps before steps were limited to 0.1, in a mix of length
+            Length of the longest step, before the steps were limited to 0.1, in a mix of length
             units and rad.
         """
         largest = 0.0
@@ -198,8 +200,8 @@ class PostureController(Controller):
     def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
         """Make a Gauss-Newton step towards the goal posture that is nearest to ``preferred``.
 
-        If the step would bring the hand hardly nearer to the goal, because the arm is singular, the
-        step also bends the arm. Joints do not have limits.
+        If the step hardly brings the hand nearer to the goal, because the arm is singular, the step
+        also bends the joints of the arm.
 
         Parameters
         ----------

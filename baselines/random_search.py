@@ -7,12 +7,12 @@ learner's standard deviation. The solution is the best trial.
 With one stage, the default, the noise does not depend on earlier rewards. So random search cannot
 learn to coarticulate. Its best trial shows what selection alone does: one of many noisy trials is
 selected by the reward of the whole task. Therefore random search is the control for the signatures
-of coarticulation (:mod:`coartic.analysis.control`). Random search stores nothing but its best
-trial; so, also with motor noise, the targets of its solution are those of the best trial.
+of coarticulation (:mod:`coartic.analysis.control`). Random search stores only its best trial. So
+the targets of its solution are those of the best trial, also with motor noise.
 
 With ``stages`` above 1 the trials are divided into equal parts. After each part, the centre of the
 noise moves to the best trial so far. Parameter ``keep`` decides whether the new centre consists of
-the postures that this trial reached, or of its targets.
+the postures that the best trial reached, or of its targets.
 
 ``random-search`` uses the hands of its parameter or, by default, the hands with which the
 corrective process on its own gets the highest reward. ``random-search/hands`` divides its trials
@@ -49,16 +49,18 @@ class RandomSearchHandsParameters(Parameters):
     """Standard deviation of the noise on each explored joint, in length units (base) and rad
     (joints). The default is the learner's."""
     stages: Annotated[int, Field(ge=1)] = 1
-    """Number r of equal parts into which the T trials with a hand sequence are divided. Part k
-    (from 1) ends after ⌊kT/r⌋ trials; in the next part the noise is centred on the best trial so
-    far. With one stage the centre does not move."""
+    """Number r of equal parts into which T trials are divided. T is the number of trials of the run
+    (in ``random-search/hands``, of trials with one hand sequence), including those in which only
+    the corrective process acts. Part k (from 1) ends after ⌊kT/r⌋ trials; in the next part the
+    noise is centred on the best trial so far. With one stage the centre does not move."""
     keep: Literal["postures", "targets"] = "postures"
     """Centre of the noise after a part: the postures in which the best trial hit the goals
     (``"postures"``), or the targets of the best trial (``"targets"``). This parameter has no effect
     with one stage."""
     idle_arm: bool = True
     """True if the idle arm (the arm of the hand that is not chosen for a goal) gets noise as well.
-    If False, the idle arm does not move, as under the learner's condition EC3."""
+    If False, the idle arm does not move, as under the learner's condition EC3. The arm of a hand
+    that the task does not use never moves."""
 
     @model_validator(mode="after")
     def _check_stages(self) -> Self:
@@ -73,8 +75,8 @@ class RandomSearchParameters(RandomSearchHandsParameters):
     """Parameters of random search."""
 
     hands: str | None = None
-    """Hand sequence, such as ``"RRLR"``. By default the method first makes a trial with each
-    sequence, in which only the corrective process acts, while trials are left; then it uses the
+    """Hand sequence, such as ``"RRLR"``. By default the method first makes one trial with each
+    sequence (while trials are left), in which only the corrective process acts. Then it uses the
     sequence with the highest reward. If there are more than 4096 sequences, it uses the task's
     initial sequence."""
 
@@ -98,7 +100,7 @@ def draw_trials(
     Returns
     -------
     Attempts
-        The trials that were made, and the best trial.
+        The number of trials that were made, and the best trial.
     int
         Number of trials with noise.
 
@@ -106,6 +108,8 @@ def draw_trials(
     ------
     MethodError
         No trial is left to make, or the corrective process completes none of the sequences tried.
+    NotApplicableError
+        ``hands`` is None, there are more than 4096 sequences, and no initial one is found.
     ValueError
         ``hands`` do not fit the task.
     """
@@ -171,8 +175,8 @@ class RandomSearchHands(Method):
 
         The numbers of trials of two sequences differ by at most one. If the corrective process
         fails with a sequence, the other trials of this sequence are not made. The details contain
-        the number of sequences with which the corrective process has hit every goal. Raises
-        MethodError if the corrective process hits every goal with no sequence that has a trial.
+        the number of sequences with which the corrective process hit every goal (``sequences``).
+        Raises MethodError if there is no such sequence.
         """
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
@@ -201,8 +205,9 @@ class RandomSearch(RandomSearchHands):
     def solve(self, session: Session) -> Result:
         """Make trials until none is left, and return the movements of the best trial.
 
-        The details contain the number of trials with noise. Raises MethodError if no trial is left
-        to make, or if the corrective process completes the task with none of the sequences tried.
+        The details contain the number of trials with noise (``evaluations``). Raises MethodError if
+        no trial is left to make, or if the corrective process completes the task with none of the
+        sequences tried.
         """
         parameters: RandomSearchParameters = self.parameters
         with session.solving():

@@ -1,24 +1,25 @@
 """A planner that looks a fixed number of goals ahead (model predictive control).
 
 The window of the planner consists of the current goal and the next ``horizon`` goals. The planner
-searches, over all hand sequences, for the shortest path through the goals of the window. It makes
-the first movement of this path, and then plans again from the end of the movement.
+searches over hand sequences (at most 64 in each posture graph) for the shortest path through the
+goals of the window. It makes the first movement of this path, and then plans again from the
+configuration in which the movement ends.
 
 - With ``horizon`` 0 the planner takes the shortest path to each goal.
-- If the window contains the last goal, all movements of the window are made, because planning again
-  would find the same movements.
+- If the window contains the last goal, all movements of the window are made, because no further
+  goal comes into view.
 - If the horizon covers all goals, the planner plans the whole task at once. The gap to the optimum
-  is then due only to the smaller search effort.
+  is then due only to the limited search.
 
 A window is planned as ``optimum/search`` plans a task (:mod:`.shortest_paths`): by chains of
 posture graphs, IPOPT, and rounding to whole ticks. To save time, there are fewer chains, the graphs
 for two hands have fewer postures, and IPOPT starts only from the shortest ``starts`` chains.
 
 The movements of each window are rounded to whole ticks together. If each movement were rounded up
-separately, each would lose half a tick on average. Rounded together, only the last movement of a
-window loses half a tick on average. This movement is made only if all movements of the window are
-made: once in a task, or at each goal if the horizon is 0. The ``path_length`` in the details is the
-length before rounding, without this loss.
+separately, each movement would lose half a tick on average. If they are rounded together, only the
+last movement of a window loses half a tick on average. The last movement is made only if all
+movements of the window are made: once in a task, or at each goal if the horizon is 0. The
+``path_length`` in the details is the length before rounding, and does not contain this loss.
 """
 
 from __future__ import annotations
@@ -87,8 +88,9 @@ class RecedingHorizon(Method):
         """Plan window by window, and return the movements that were made.
 
         The details contain the length of the path before rounding (``path_length``, in a mix of
-        length units and rad), and the numbers of windows, of solves and of failed solves. Raises
-        MethodError if no path through a window is found.
+        length units and rad), the number of windows (``windows``), the number of starts of IPOPT
+        (``solves``), and how many of them did not converge (``failed_solves``). Raises MethodError
+        if no path through a window is found.
         """
         task, parameters = session.reveal(*self.information), self.parameters
         exact = session.model.without_noise()

@@ -4,7 +4,7 @@ The search for the optimum and the receding-horizon planner share this code:
 
 1. IPOPT finds a locally shortest path from each start (:func:`shortest_plans`).
 2. The shortest path of each hand sequence is rounded to whole ticks (:func:`fewest_ticks`). A path
-   is skipped if an approximate lower bound of its ticks is not below the ticks of the best rounding
+   is skipped if an approximate lower bound on its ticks is not below the ticks of the best rounding
    so far. In some roundings there is no movement to a goal, because the hand is already inside the
    goal when the goal becomes current.
 """
@@ -22,7 +22,7 @@ from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
 
 REWARD_INFORMATION = MODEL_BASED | {Information.REWARD_FORMULA}
-"""Information that a method uses if it searches for shortest paths in this way."""
+"""Information that a method uses if it calls the functions of this module."""
 
 
 class ShortestPlans(NamedTuple):
@@ -43,7 +43,7 @@ class PlanInTicks(NamedTuple):
     movements: tuple[Movement, ...]
     """A movement for each goal."""
     execution: Execution
-    """Execution of these movements."""
+    """Execution of these movements without motor noise."""
     plan: PathPlan
     """The plan before rounding."""
 
@@ -104,12 +104,15 @@ def fewest_ticks(
 ) -> PlanInTicks:
     """Round plans to whole ticks, and return the rounding with the fewest ticks.
 
-    Each rounding is executed, and discarded if it misses a goal. Among roundings with equal ticks,
-    the one with the fewest corrective movements is returned. Two kinds of roundings are not tried:
+    Roundings are executed without motor noise; if a movement misses its goal, the corrective
+    process acts. A rounding is discarded if its execution does not hit every goal. Among executed
+    roundings with equal ticks, the one with the fewest corrective movements is returned. Three
+    kinds of roundings are not executed:
 
     - all roundings of a plan except the 64 nearest to it (:meth:`.Rounding.iter_roundings`);
-    - roundings whose estimated ticks (:meth:`.Rounding.estimated_ticks`), an approximate lower
-      bound, are not below the ticks of the best rounding so far.
+    - roundings of a plan whose estimated ticks (:meth:`.Rounding.estimated_ticks`), an approximate
+      lower bound, are not below the ticks of the best rounding so far;
+    - roundings whose own ticks are not below the ticks of the best rounding so far.
 
     Parameters
     ----------

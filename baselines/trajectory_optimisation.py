@@ -1,8 +1,8 @@
 """Trajectory optimisation: informed search with the objective as a formula.
 
 There is a method for each cost. The cost *path length* corresponds to the task's reward. The other
-costs are smoothness objectives, from theories of coarticulation in which the mover has a model of
-its own kinematics:
+costs are smoothness objectives. They come from theories of coarticulation that assume an internal
+model of the kinematics:
 
 - the sum of squared joint displacements (Jordan 1986, 1992);
 - acceleration of the joints;
@@ -11,8 +11,9 @@ its own kinematics:
 
 For the last three costs, the durations of the movements are variables whose sum is constant.
 
-For each hand sequence, a method finds plans with locally minimal cost by IPOPT, from the cheapest
-chains of posture graphs. It returns the plan that is cheapest *by its own cost*.
+For each hand sequence (at most 64 in each posture graph, by default), a method finds plans with
+locally minimal cost by IPOPT, which starts from the cheapest chains of posture graphs. The method
+returns the plan that is cheapest *by its own cost*.
 """
 
 from __future__ import annotations
@@ -156,9 +157,17 @@ class TrajectoryOptimisation(Method):
         (:meth:`.Rounding.nearest`). If that fails, the plan is solved again with targets well
         inside the discs of the goals.
 
-        The details contain the cost and the path length of the cheapest plan, and two dicts keyed
-        by hand sequence: the costs of all plans, and the reasons why IPOPT failed. Raises
-        MethodError if IPOPT converges for no hand sequence, or if a goal has no posture in a graph.
+        The details contain
+
+        - ``cost``: cost of the cheapest plan before rounding;
+        - ``path_length``: sum of the straight distances from goal to goal in this plan, in a mix of
+          length units and rad (the path itself is longer if it is curved);
+        - ``costs``: dict that maps each hand sequence with a converged plan to the cost of the
+          plan;
+        - ``failed``: dict that maps each other hand sequence to the status that IPOPT returned.
+
+        Raises MethodError if IPOPT converges for no hand sequence, if a goal has no posture in a
+        graph, or if both the rounding and the solve with targets inside the discs fail.
         """
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
         with session.building():
@@ -264,7 +273,7 @@ class TrajectoryOptimisation(Method):
 
 
 class PathLength(TrajectoryOptimisation):
-    """Shortest path in joint space, which is the task's reward."""
+    """Shortest path in joint space, whose length determines the task's reward."""
 
     name = "trajectory-optimisation/path-length"
     title = "shortest-path plan"
@@ -354,9 +363,8 @@ def path_movements(
 
     A movement ends where the hand enters its goal, usually before the end of the piece of the path
     that leads to this goal. The next movement therefore begins with the remaining waypoints of that
-    piece. At these waypoints, the joints that ``instance`` holds during the next movement keep the
-    angles that they have at the start of this movement. A movement that misses its goal is
-    returned, too.
+    piece. At all waypoints of a movement, the joints that ``instance`` holds during this movement
+    have the values of the start of the movement. A movement that misses its goal is returned, too.
 
     Parameters
     ----------

@@ -27,12 +27,12 @@ jerk of the hand that moves to the goal is computed by Gauss-Legendre quadrature
 hand does not determine the motion in the null space of its Jacobian; the joint jerk, with its small
 weight w, determines this motion.
 
-A nonlinear programme is compiled for each combination of a robot, a set of hands, a number of goals
-and a cost. The start, the goals and the hand sequence are parameters of the programme. Locked base
-coordinates and held arms are expressed by bounds of the variables. So one compiled programme serves
-all hand sequences of a task. The solver is IPOPT (Wächter & Biegler 2006) with exact derivatives
-from CasADi (Andersson et al. 2019). IPOPT's linear solver is not thread-safe: to solve in parallel,
-use processes.
+A nonlinear programme is compiled for each combination of a robot, a set of hands, a number of
+goals, a cost and a weight of the base. The start, the goals and the hand sequence are parameters of
+the programme. Locked base coordinates and held arms are expressed by bounds of the variables. So
+one compiled programme serves all hand sequences of a task. The solver is IPOPT (Wächter & Biegler
+2006) with exact derivatives from CasADi (Andersson et al. 2019). IPOPT's linear solver is not
+thread-safe: to solve in parallel, use processes.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ _ONE_AT_A_TIME = RLock()
 must not do so at the same time."""
 IPOPT = "wachter2006", "andersson2019"
 """Keys in ``references.bib`` of the works on the solver."""
-_RIM = 1e-7  # solutions stay this far inside the disc (in length units): IPOPT's tolerance
+_RIM = 1e-7  # solutions stay this far inside the disc (in length units), for IPOPT's tolerance
 # Least duration of a segment; the mean is 1. It binds where a smooth plan would hit two goals at
 # once. With a smaller value, jerk does not converge for many hand sequences of two-armed-2.
 _SHORTEST: dict[Cost, float] = {"acceleration": 0.01, "jerk": 0.05, "hand-jerk": 0.2}
@@ -97,7 +97,7 @@ _OPTIONS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Instance:
-    """Data of one problem: start, goals, hand of each goal, and joints that are held."""
+    """Data of one problem: start, goals, radius, hands and held joints."""
 
     q0: Array
     """Starting configuration, shape ``(dof,)``, in length units and rad."""
@@ -106,7 +106,8 @@ class Instance:
     hands: tuple[Hand, ...]
     """Hand of each goal."""
     held: NDArray[np.bool_]
-    """True for joints that cannot move on the way to a goal, shape ``(G, dof)``."""
+    """True for entries of a configuration that cannot change on the way to a goal, shape ``(G,
+    dof)``."""
     radius: float
     """Largest distance of a hand from the centre of its goal (in length units)."""
 
@@ -167,6 +168,7 @@ class PathPlan:
     instance: Instance
     """The instance that was solved."""
     converged: bool
+    """True if IPOPT reports success and the constraints hold (:meth:`TrajectoryProblem.solve`)."""
     reason: str
     """Return status of IPOPT, such as ``Solve_Succeeded``."""
     configurations: Array
@@ -202,7 +204,11 @@ class PathPlan:
 
 
 class TrajectoryProblem:
-    """Compiled nonlinear programme for one robot, set of hands, number of goals and cost."""
+    """Compiled nonlinear programme, which is solved for many instances (:class:`Instance`).
+
+    The programme is compiled for one robot, set of hands, number of goals, cost and weight of the
+    base.
+    """
 
     def __init__(
         self,
@@ -303,15 +309,16 @@ class TrajectoryProblem:
             True to make all rates at all goals 0. Only for costs with rates.
         deep : sequence of int
             Numbers of goals, from 0. If there are any, the solver does not minimise the path
-            length. Instead it maximises the smallest depth of the hands in the discs of these goals
-            (the distance of the hand from the rim), subject to ``lengths``. Only for cost
-            ``path-length``.
+            length. Instead it maximises the smallest depth of the hands in the discs of these
+            goals, subject to ``lengths``. (The depth is the distance of a hand from the rim.) Only
+            for cost ``path-length``.
 
         Returns
         -------
         PathPlan
-            The plan. Attribute ``converged`` is True if IPOPT reports success and all constraints
-            hold to within 1e-8. A plan that has not converged is returned as well.
+            The plan. Attribute ``converged`` is True if IPOPT reports success (also to an
+            acceptable level) and all constraints hold to within 1e-8. A plan that has not converged
+            is returned as well.
         """
         goals, at = self._goals, self._at
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
@@ -380,7 +387,7 @@ class TrajectoryProblem:
 
 
 def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
-    """Return the smallest cost of a segment between two given states of the joints.
+    """Return the smallest cost of a segment with given joint states at its ends.
 
     Among all movements between two states of the joints (position, velocity and, for jerk,
     acceleration), a cubic minimises ∫|q̈|² and a quintic minimises ∫|q⃛|² (Flash & Hogan 1985).
@@ -397,8 +404,8 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     time : casadi.SX
         Duration, above 0.
     rates : list of tuple
-        Tuple of the velocities at both ends and, for both kinds of jerk, tuple of the accelerations
-        at both ends; each has shape ``(dof,)``.
+        A tuple with the velocities at both ends and, for both kinds of jerk, a second tuple with
+        the accelerations at both ends; each entry has shape ``(dof,)``.
 
     Returns
     -------
@@ -428,8 +435,8 @@ def _hand_jerks(
 ) -> Any:
     """Return the integral of a hand's squared jerk over each of G segments.
 
-    In each segment, the joints move along a quintic. The integral is computed by Gauss-Legendre
-    quadrature with 6 nodes.
+    In each segment, the joints move along a quintic polynomial in time. Gauss-Legendre quadrature
+    with 6 nodes approximates the integral.
 
     Parameters
     ----------

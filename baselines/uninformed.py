@@ -3,6 +3,8 @@
 As in the learner, a trial moves towards a target configuration for each goal, and the corrective
 process **A** corrects the movements that miss their goals. After the trial, the method knows the
 total reward of the trial and the configurations in which the trial hit the goals.
+
+In this module *joints* are all entries of a configuration: base coordinates and joint angles.
 """
 
 from __future__ import annotations
@@ -22,14 +24,14 @@ from coartic.robot import Array
 
 
 class UninformedParameters(Parameters):
-    """Parameters of CMA-ES, hill climbing and policy gradient; the defaults are the learner's."""
+    """Parameters of CMA-ES, hill climbing and policy gradient, with the learner's defaults."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Number of trials of a run."""
     sigma: Annotated[float, Field(gt=0, le=10)] = 0.05
-    """Standard deviation of the noise on the targets, in length units (base) and rad (joints). It
-    is only the first value where the method adapts the standard deviation: in CMA-ES, and with
-    ``spread="learned"`` in policy gradient and hill climbing."""
+    """Standard deviation of the noise on the targets, in length units (base) and rad (joints).
+    CMA-ES, and policy gradient and hill climbing with ``spread="learned"``, begin with this value
+    and adapt it."""
 
 
 class SequenceParameters(UninformedParameters):
@@ -37,13 +39,13 @@ class SequenceParameters(UninformedParameters):
 
     sequence: str | None = None
     """Hand sequence of all trials, such as ``"RRLR"``, or ``"given"`` for the task's initial hands
-    (:meth:`.Session.find_initial_hands`). By default the method finds the hands itself."""
+    (:meth:`.Session.find_initial_hands`). By default the method explores hand sequences."""
 
     def told_hands(self, session: Session) -> str | None:
         """Return the hand sequence that parameter ``sequence`` stands for, or None.
 
-        For ``"given"`` the session finds the task's initial hands, whose errors are raised
-        (:meth:`.Session.find_initial_hands`).
+        For ``"given"``, :meth:`.Session.find_initial_hands` finds the sequence, and its errors are
+        raised.
         """
         return session.find_initial_hands() if self.sequence == "given" else self.sequence
 
@@ -64,7 +66,7 @@ class Attempts:
         self.explored = np.tile(explored_joints(session), (session.goals_count, 1))
         """True for the joints that are explored at each goal, shape ``(G, dof)``."""
         self.is_noisy = session.model.motor_noise > 0.0
-        """True if the world has motor noise, in which the best trial was partly lucky."""
+        """True if the motion model has motor noise, so that the best reward is partly luck."""
         left = session.trials_left
         self.left = trials if left is None else min(trials, left)
         """Number of trials left."""
@@ -77,15 +79,15 @@ class Attempts:
         self.best_trial = -1
         """Number of the best trial, from 0; -1 before the first success."""
         self.targets: Array = np.empty(0)
-        """Targets of the best trial, shape ``(G, dof)``, in length units and rad. With motor noise,
-        the target of a joint that does not move is NaN, so that the joint does not move when the
-        targets are used again."""
+        """Targets of the best trial, shape ``(G, dof)``, in length units and rad; empty before the
+        first success. With motor noise, the target of a joint that does not move is NaN, so that
+        the joint does not move when the targets are used again."""
         self.reached: Array = np.empty(0)
         """Configurations in which the best trial hit the goals, shape ``(G, dof)``, in length units
-        and rad."""
+        and rad; empty before the first success."""
 
     def run_corrective(self, *hand_sequences: str) -> Trials:
-        """Make a trial with each hand sequence in which only the corrective process acts.
+        """Make a trial with each hand sequence, in which only the corrective process acts.
 
         Parameters
         ----------
@@ -114,8 +116,8 @@ class Attempts:
         hand_sequence : str
             Hand sequence, such as ``"RRLR"``.
         values : ndarray, shape (N, n)
-            Targets of the n explored joints of all goals (True in ``explored``), goal by goal, in
-            length units and rad; N is at least 1. Other joints do not move.
+            Targets of the explored joints (True in ``explored``), goal by goal, in length units and
+            rad. A row contains the n targets of a trial; N is at least 1. Other joints do not move.
 
         Returns
         -------
@@ -139,7 +141,7 @@ class Attempts:
         Parameters
         ----------
         hand_sequences : str or list of str
-            Hand sequence of all trials, or of each trial.
+            One hand sequence for all trials, or a list with a hand sequence for each trial.
         targets : ndarray, shape (N, G, dof)
             Targets, in length units and rad; NaN for joints that do not move. N is at least 1.
         until : ndarray, shape (N,), optional
@@ -188,9 +190,9 @@ class Attempts:
         Parameters
         ----------
         recommended : callable, optional
-            Function that returns the movements that the method recommends. With motor noise, this
-            function is called, and the movements that it returns take the place of those of the
-            best trial.
+            Function that returns the movements that the method recommends. With motor noise, these
+            movements take the place of the movements of the best trial; without motor noise, the
+            function is not called.
         **details
             Details of the result, in addition to ``best_trial``, the number of the best trial from
             0.
@@ -202,7 +204,7 @@ class Attempts:
         Raises
         ------
         MethodError
-            No trial has hit every goal. ``recommended`` is then not called.
+            No trial has hit every goal. In this case ``recommended`` is not called.
         """
         if not self.trials_made:
             raise MethodError("infeasible", "the trial budget leaves no trial to make", details)

@@ -3,8 +3,9 @@
 A movement takes a whole number of control steps of length m (:attr:`.MotionModel.step`). So a plan
 loses up to a step at each segment whose length is not a multiple of m. This module rounds the
 lengths of the segments to multiples of m, up or down, and solves for the shortest path again with
-these lengths. The target of each movement lies beyond the configuration at the goal on the same
-straight line in joint space, so that the movement ends when the hand enters the goal.
+these lengths. The target of each movement lies on the straight line in joint space through the
+configuration at the goal, beyond this configuration. So the movement ends when the hand enters the
+goal.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from coartic.method import Session
 from coartic.motion.doors import move, scale_base
 from coartic.robot import Array
 
-MAX_ROUNDINGS = 64  # roundings of a plan that are tried; up to seven goals have no more
+MAX_ROUNDINGS = 64  # roundings of a plan that are tried; a plan for up to 7 goals has no more
 _SLACK = 1e-6  # part of a step: lengths have the solver's tolerance
 _BEYOND = tuple(1 << k for k in range(11))  # numbers of steps from the configuration to the target
 
@@ -47,9 +48,9 @@ class TickPlan:
 class Rounding:
     """Round plans of one problem and instance to whole steps.
 
-    In all functions, parameter ``merged`` contains the numbers (from 0) of the goals to which there
-    is no movement, because the hand is already inside the goal when the goal becomes current. The
-    session counts the effort of the solver.
+    Parameter ``merged`` of the methods below contains the numbers (from 0) of the goals to which
+    there is no movement, because the hand is already inside the goal when the goal becomes current.
+    The session counts the effort of the solver.
     """
 
     def __init__(self, session: Session, problem: TrajectoryProblem, instance: Instance) -> None:
@@ -60,8 +61,13 @@ class Rounding:
         """Round each segment to the nearest number of steps, and the last segment up.
 
         Before the last segment is rounded, the solver makes it as short as the rounded lengths of
-        the other segments allow. To first order all roundings of a shortest path
+        the other segments allow. To first order, all roundings of a shortest path
         (:meth:`iter_roundings`) take the same number of ticks.
+
+        Parameters
+        ----------
+        plan : PathPlan
+            Shortest plan with a movement to each goal.
 
         Returns
         -------
@@ -75,10 +81,10 @@ class Rounding:
         """Yield the 64 nearest roundings of a plan to whole steps.
 
         The nearest rounding comes first. Each segment except the last is rounded up or down; the
-        last segment is rounded up. The distance of a rounding from the plan is the sum of the
-        differences between the numbers of steps before and after rounding. A plan for up to seven
-        goals has at most 64 roundings, all of which are tried. Roundings for which the solver fails
-        are left out.
+        last segment is rounded up. The distance of a rounding from the plan is the sum, over all
+        segments except the last, of the absolute difference between the numbers of steps before and
+        after rounding. A plan for up to seven goals has at most 64 roundings, so that all of them
+        are tried. Roundings for which the solver fails are left out.
         """
         exact = plan.lengths()[:-1] / self._step
         choices = [sorted({math.floor(length), math.ceil(length)}) for length in exact]
@@ -92,7 +98,7 @@ class Rounding:
                 yield rounded
 
     def estimated_ticks(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
-        """Return an approximate lower bound of the ticks of a plan's roundings.
+        """Return an approximate lower bound on the ticks of a plan's roundings.
 
         The bound is the total length of the plan in control steps, rounded up, plus one tick for
         each movement. Roundings of a shortest plan rarely take fewer ticks.
@@ -106,7 +112,7 @@ class Rounding:
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
         """Yield the shortest plan for each set of goals to which there is no movement.
 
-        Breadth-first search over sets of goals. A goal can be in a set if its hand may already be
+        The sets come from a breadth-first search. A goal can be in a set if its hand may already be
         inside the goal when the goal becomes current. Sets for which no plan is found are left out.
 
         Parameters
@@ -116,19 +122,19 @@ class Rounding:
         task : Task
         worth : callable
             Function that returns whether a plan with a given number of ticks is of interest. A set
-            of goals is not extended if :meth:`estimated_ticks` shows that no larger set can have
-            such a number of ticks.
+            of goals is not extended if, by :meth:`estimated_ticks`, no plan for a larger set is of
+            interest.
 
         Yields
         ------
         tuple of int
-            Numbers (from 0) of the goals that take no movement. The first tuple is empty.
+            Numbers (from 0) of the goals to which there is no movement. The first tuple is empty.
         PathPlan
             Shortest plan found for these goals.
         """
         hands, goals = self._instance.hands, len(self._instance.hands)
-        # A hand can be in its goal before the turn of the goal: at the start, if the other hand
-        # hits the goal before, or if the discs of both goals overlap.
+        # A hand can be in its goal before this goal becomes current: at the start, if the other
+        # hand hits the goal before, or if the discs of these two goals overlap.
         start = task.robot.forward_kinematics(task.q0, hands[0])
         able = [0] if math.dist(start, task.goals[0]) <= task.radius else []
         able += [
@@ -161,7 +167,7 @@ class Rounding:
             Number of steps to each goal except the last goal. The number of steps to the last goal
             is the smallest that the solver finds.
         merged : tuple of int
-            Goals, from 0, that take no movement.
+            Numbers (from 0) of the goals to which there is no movement.
 
         Returns
         -------
@@ -201,7 +207,7 @@ class Rounding:
         lengths : ndarray, shape (G,)
             Largest joint-space length of each movement; NaN for a movement of any length.
         merged : tuple of int
-            Goals, from 0, that take no movement.
+            Numbers (from 0) of the goals to which there is no movement.
         deep : sequence of int
             Numbers of goals, from 0. If there are any, the solver does not minimise the path
             length; it moves the hands as deep into the discs of these goals as ``lengths`` allow.
@@ -231,8 +237,8 @@ def movements(
 ) -> tuple[Movement, ...]:
     """Return the movements of a plan, one for each goal.
 
-    A joint that ``instance`` holds on the way to a goal keeps the angle that it has at the end of
-    the movement before, even if the movement before ended before its own target.
+    A joint that ``instance`` holds on the way to a goal keeps the value that it has at the end of
+    the movement before, even if that movement ended before its target.
 
     Parameters
     ----------
@@ -244,11 +250,11 @@ def movements(
     configurations : ndarray, shape (G, dof)
         Configuration at each goal, in length units and rad.
     steps : tuple of int, optional
-        Largest number of steps of the movement to each goal. If it is given, the target of a
-        movement lies beyond the configuration on the same straight line in joint space, so that the
-        movement hits the goal within this number of steps. If no such target is found, the target
-        is the configuration itself. For 0 steps the movement is corrective; it takes no ticks if
-        the hand is already in the goal.
+        Largest number of steps of the movement to each goal. The target of a movement then lies on
+        the straight line in joint space through the configuration, beyond it, so that the movement
+        hits the goal within this number of steps. If no such target is found, the target is the
+        configuration itself. For 0 steps the movement is corrective; it takes no ticks if the hand
+        is already in the goal. By default all targets are the configurations.
 
     Returns
     -------

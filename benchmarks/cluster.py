@@ -29,14 +29,14 @@ _GOES_ON = "Finished runs are stored; repeat the command to resume."
 class Dask:
     """Executor that performs jobs on the workers of a Dask scheduler.
 
-    The machines of the workers should have the same version of coartic as this process.
+    The machines of the workers must have the same versions of the planned methods as this process.
 
     Parameters
     ----------
     address : str
         Address that the scheduler prints, such as ``tcp://127.0.0.1:8786``.
     say : callable
-        Function that is called with a sentence, such as ``print``, when the scheduler has no worker
+        Function, such as ``print``, that is called with a sentence when the scheduler has no worker
         and the executor begins to wait for one.
 
     Examples
@@ -46,13 +46,13 @@ class Dask:
 
     def __init__(self, address: str, *, say: Callable[[str], None] = print) -> None:
         self.address, self.say = address, say
-        self.workers = 1  # the number of workers can change, so jobs are as large as methods allow
+        self.workers = 1  # the number of workers can change, so it does not limit the size of jobs
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Yield each job with the outcomes of its runs, as jobs finish.
 
-        If a worker dies, another worker performs the jobs of the dead worker. If several workers
-        die while they perform the same job, the outcomes of this job have status ``crashed``.
+        If a worker dies, another worker performs its unfinished jobs. If several workers die while
+        they perform the same job, the outcomes of this job have status ``crashed``.
 
         Parameters
         ----------
@@ -142,7 +142,7 @@ def _remote(job: Job) -> list[Outcome]:
 
     Return the outcome of each run, with the environment of the worker's machine. Raises
     CoarticError if the version or the code of the method differs on that machine, or if processes
-    cannot start on it.
+    cannot start there.
     """
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method, used = job.cell.method, current_environment()

@@ -39,7 +39,7 @@ from coartic.tasks.task import check_task
 CHECK_TRIALS = 60  # trials of a run: enough to learn something, few enough to be quick
 _LIMIT_S = 120.0  # limit of CPU time of a run
 _BUDGET = 7  # trial budget of the runs that check ``limits``
-_NOISE = "motor noise"  # kind of the runs in a world with noise, and name of their check
+_NOISE = "motor noise"  # kind of the runs with motor noise, and name of their check
 _WORLD = MotionModel(motor_noise=0.01)
 
 
@@ -76,6 +76,11 @@ def check_method(
     -------
     list of CheckResult
         A result for each check, in the order of :data:`CHECKS`.
+
+    Raises
+    ------
+    CoarticError
+        Worker processes cannot start, or the file of the method was changed after it was read.
     """
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
@@ -147,10 +152,10 @@ def _solution(info: MethodInfo, runs: _Runs) -> Iterator[str]:
 
 
 def _changes(runs: _Runs, kind: str, how: str) -> Iterator[str]:
-    """Yield the differences between the runs of one kind and the first runs.
+    """Yield a sentence for each difference between runs of one kind and first runs.
 
-    On each task, the run of kind ``kind`` is compared with the run of kind ``first``. ``how`` is
-    the beginning of each sentence; the name of the task replaces its ``{}``.
+    On each task, the run of kind ``kind`` is compared with the run of kind ``first``. Each sentence
+    begins with ``how``, in which the name of the task replaces ``{}``.
     """
     for task, run in runs.get(kind, {}).items():
         yield from (f"{how.format(task)}: {c}" for c in compare_runs(runs["first"][task], run))
@@ -203,8 +208,8 @@ def _is_best_trial(run: Row) -> bool:
 
     The solution is executed with the noise draw of the best trial. If the solution consists of the
     movements of the best trial, this execution takes as many ticks as the best trial. Any other
-    solution takes as many ticks only by chance. If all trials have the same reward, the result is
-    False.
+    solution takes as many ticks only by chance. If all trials have the same reward, or if there are
+    no trials, the result is False.
     """
     rewards = [-inf if reward is None else reward for reward in run.rewards]
     if len({*rewards}) < 2:
@@ -278,7 +283,7 @@ second function returns a sentence on what was checked; it is called if there is
 
 
 def _hopeless_task(like: Task) -> Task:
-    """Return a copy of a task in which one goal, out of reach, replaces all goals."""
+    """Return a copy of a task with a locked base and one unreachable goal."""
     return like.model_copy(
         update={
             "name": "hopeless",
@@ -298,13 +303,13 @@ def check_task_file(path: Path, registered: Registry) -> list[CheckResult]:
     path : Path
         The file.
     registered : mapping
-        Dict that maps ids to the declarations of all known methods. The result of check ``valid``
-        says how many of these methods can run on the task.
+        Dict that maps ids to the declarations of all known methods. The finding of check ``valid``
+        says how many of these methods apply to the task.
 
     Returns
     -------
     list of CheckResult
-        Results of three checks; if the file is not valid, only the result of the first:
+        Results of three checks. If the file is not valid, only the first result is returned:
 
         - ``valid``: the file is a task whose goals can be reached;
         - ``distinct goals``: the centres of successive goals are more than one radius apart;

@@ -4,8 +4,8 @@ Results folders can be joined if all of them agree in
 
 - the suite, its seed and the trial budget;
 - the task that each task name stands for;
-- the version or code of each method. (There is an exception: if the code of a method from a file
-  has changed since its runs were made, these runs are left out, and a warning names the method);
+- the version or code of each method (with an exception: if the code of a method from a file has
+  changed since its runs were made, these runs are left out, and a warning names the method);
 - the parameters of each method and setting on each task.
 
 The folders may come from different machines, and from different versions of coartic and of
@@ -44,8 +44,9 @@ def include_folders(
     """Copy the runs of other folders into a results folder, and join their plans.
 
     A cell is a method with its parameters on a task. The joined plan consists of the cells of
-    ``plan``, and of the cells of the other folders whose run 0 is stored there. The joined plan
-    replaces the plan of ``out``. This function performs no missing runs; :func:`.perform` does.
+    ``plan``, and of those cells in the plans of the other folders of which run 0 is stored in one
+    of these folders. The joined plan replaces the plan of ``out``. This function does not perform
+    missing runs; :func:`.perform` does.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ def include_folders(
         Results folder into which the runs are copied. A missing folder is made.
     tasks : collection of str, optional
         Names of tasks. Cells of the other folders on tasks that are not named here are left out. By
-        default, no cell is left out.
+        default, cells on all tasks are joined.
     methods : mapping of str to MethodInfo, optional
         Dict that maps ids to the methods that the command knows; by default the methods of
         ``plan``. Runs of a method from a file are used only if the code that made them is the code
@@ -74,6 +75,7 @@ def include_folders(
         Nothing is copied, because
 
         - a folder does not exist or cannot be read, or is ``out`` itself;
+        - ``out`` cannot be written, or has results of another suite;
         - the numbers of the runs of a job of ``plan`` do not begin at 0;
         - the folders do not agree (:mod:`.include` lists what must be equal);
         - two folders have different results of the same run. One of them may be ``out``.
@@ -83,9 +85,11 @@ def include_folders(
     UserWarning
         One of these is the case:
 
-        - a folder lacks runs of its own plan;
-        - a folder contains a cell of a stochastic method that ``plan`` lacks, with fewer runs than
-          the largest number of runs that ``plan`` asks for;
+        - the joined plan lacks runs of the plan of a folder, because they are not stored in any
+          folder;
+        - the plan of a folder contains a cell of a stochastic method that ``plan`` lacks, and the
+          joined plan has fewer runs of this cell than the largest number of runs that ``plan`` asks
+          for;
         - a folder contains runs of a method from a file that were made by other code than the code
           in ``methods``.
     """
@@ -128,15 +132,16 @@ def _join(
 ) -> list[Job]:
     """Join the plan of a command with the plans of other results folders.
 
-    A cell is left out if
+    All cells of ``plan`` are in the joined plan. A cell of another folder is left out if
 
     - its task is not in ``tasks`` (None stands for all tasks);
     - its method is from a file, and the code of the method differs from the code in ``known`` (a
       warning says so);
     - it is not in ``plan``, and no folder contains run 0 of the cell.
 
-    The runs of a cell of the joined plan are numbered from 0 without gaps. They are all runs that
-    ``plan`` asks for, and then each next run, as long as it is stored in one of the folders.
+    The runs of a cell of the joined plan are numbered from 0 without gaps: first all runs that
+    ``plan`` asks for, then the runs with the next numbers, up to the first one that is stored in
+    none of the folders.
 
     Parameters
     ----------
@@ -211,10 +216,11 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of each folder that lacks runs, or has too few runs of a cell.
+    """Warn of each folder whose plan has cells with missing or too few runs.
 
-    A cell has too few runs if its method is stochastic, the command does not ask for the cell, and
-    the joined plan has fewer runs of the cell than the largest number in ``asked``.
+    A cell has missing runs if the joined plan has fewer runs of the cell than the plan of the
+    folder. A cell has too few runs if its method is stochastic, the command does not ask for the
+    cell, and the joined plan has fewer runs of the cell than the largest number in ``asked``.
 
     Parameters
     ----------

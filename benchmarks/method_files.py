@@ -47,8 +47,8 @@ _ANSWER_S = 300.0  # longest wait for an answer: libraries can take long to impo
 def read_file(path: Path) -> list[MethodInfo]:
     """Return the declarations of the methods of a file.
 
-    A new process imports the file. That process stays alive, and later answers questions about the
-    methods (:data:`READERS`).
+    A new process imports the file. This process stays alive, and answers later questions about the
+    methods (:data:`.READERS`).
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def _ask(reader: Any, shown: str, function: Any, *arguments: Any) -> Any:
     Parameters
     ----------
     reader : pebble.ProcessPool
-        Pool with the one process that has imported the file, or will import it.
+        Pool of one process, which has imported the file or will import it.
     shown : str
         Name of the file in messages.
     function : callable
@@ -93,7 +93,8 @@ def _ask(reader: Any, shown: str, function: Any, *arguments: Any) -> Any:
     Raises
     ------
     CoarticError
-        The function raised a CoarticError, or the process gave no result.
+        The function raised a CoarticError, or the process cannot start, ended, or did not answer
+        within 300 s.
     """
     try:
         return reader.schedule(function, args=arguments, timeout=_ANSWER_S).result()
@@ -131,8 +132,8 @@ def _answer(path: Path, method: str, question: str, *arguments: Any) -> Any:
 def check_code(info: MethodInfo) -> None:
     """Import the file of a method, and check that its code has not changed.
 
-    Raises CoarticError if the hash of the code (:func:`_code_of`) differs from ``info.code``. Then
-    the file, or a file that it reads or imports, was changed after ``info`` was made.
+    Raises CoarticError if the hash of the code (:func:`_code_of`) differs from ``info.code``,
+    because the file, or a file that it reads or imports, was changed after ``info`` was made.
     """
     path = Path(info.where)
     module, loaded = load_file(path, info.code)
@@ -165,8 +166,9 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
     Raises
     ------
     CoarticError
-        The file cannot be imported, defines no complete method, or a method has an attribute of the
-        wrong type or a function with the wrong arguments.
+        The file cannot be imported or defines no complete method; or a method has an attribute of
+        the wrong type, a function with the wrong arguments, or a function ``why_not`` (the old name
+        of ``inapplicable_reason``).
     """
     try:
         module, loaded = load_file(path)
@@ -261,7 +263,7 @@ def _user_files(names: Iterable[str]) -> set[Path]:
 
 
 def _packages_of(files: Iterable[Path]) -> dict[str, str]:
-    """Return the installed packages that Python files import, as a dict from names to versions.
+    """Return a dict that maps the installed packages that Python files import to their versions.
 
     Modules of the standard library and of coartic are left out.
     """

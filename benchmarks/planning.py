@@ -51,7 +51,7 @@ from coartic.tasks.task import address_of, check_task
 
 
 def _task_or_name(value: Any) -> Task | str:
-    """Validate a task: return a Task unchanged, and a name or path as a string."""
+    """Validate a task: return a Task unchanged, a name or path as a string."""
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
     raise described_error(f"task {value!r} must be a name, a path or a Task")
@@ -72,7 +72,7 @@ def _runs_asked(value: Any) -> int | range | None:
 
 
 def _one_world(worlds: Worlds) -> Worlds:
-    """Refuse several worlds."""
+    """Return the worlds unchanged; raise a validation error if there is more than one."""
     if len(worlds) > 1:
         raise described_error(
             "model has a list of values; here each constant has one value. Lists belong into table "
@@ -86,26 +86,27 @@ class Request(FileData):
 
     tasks: tuple[Annotated[Any, PlainValidator(_task_or_name)], ...] = ()
     """Tasks to run: names of tasks, ranges of instances such as ``"long/v1/i000..i009"``, paths of
-    task files, or objects (Task). By default all tasks of the suite are run. The suite need not
-    have an instance of a family or a task of your own that is named here: on such a task, all
-    ``methods`` that apply to it are run (by default all methods of the suite)."""
+    task files, or objects (Task). By default all tasks of the suite are run. Instances of families
+    and tasks of your own can be named here even if the suite does not have them: on such a task,
+    all ``methods`` that apply to it are run (by default all methods of the suite)."""
     methods: tuple[str, ...] = ()
-    """Methods to run: ids, or wildcards such as ``"optimum/*"``. By default all methods of the
-    suite are run; ``"*"`` stands for them, too. A method that the suite does not have is run on all
-    tasks of the suite to which it applies."""
+    """Methods to run: ids, exploration conditions such as ``"EC1"``, or wildcards such as
+    ``"optimum/*"``. By default all methods of the suite are run; ``"*"`` stands for them, too. A
+    method that the suite does not have is run on all planned tasks to which it applies."""
     method_files: tuple[Path, ...] = ()
     """Python files that define your own methods. If ``methods`` or the suite names a method of a
-    file, by its id or by a wildcard, only the named methods of this file are run. Otherwise all
-    methods of the file are run, in addition to the other methods."""
+    file, by its id or by a wildcard (in ``methods`` a wildcard other than ``"*"``), only the named
+    methods of this file are run. Otherwise all methods of the file are run, in addition to the
+    other methods."""
     family_files: tuple[Path, ...] = ()
     """TOML files with your own families. ``tasks`` names their instances."""
     runs: Annotated[Any, PlainValidator(_runs_asked)] = None
     """Number of runs of each cell (a method with its parameters on a task); by default the number
     that the suite sets. A range such as ``range(50, 100)`` asks only for the runs with these
-    numbers, so that the jobs of a cluster can divide the runs of a suite among them."""
+    numbers, so that several jobs of a cluster can each perform a part of the runs of a suite."""
     trials: TrialCount | None = None
     """Number of trials of each run, for methods that have this parameter. By default it is the
-    number that the suite sets, or else the default of the method."""
+    number that the suite or its block sets, or else the default of the method."""
     seed: Annotated[int, Field(ge=0, le=MAX_SEED, strict=True)] = 0
     """Seed of the suite, from which the seeds of all runs are computed."""
     time_limit_s: Seconds | None = None
@@ -113,9 +114,9 @@ class Request(FileData):
     trial_budget: TrialCount | None = None
     """Largest number of physical trials of a run, for all methods; by default there is no limit."""
     model: Annotated[Worlds, AfterValidator(_one_world)] | None = None
-    """World in which methods practise and are scored, as a dict with one value for each constant
-    that differs from the paper's, such as ``{"motor_noise": 0.01}``. Blocks of the suite that have
-    a world of their own (table ``model`` of the block or of the suite) are left out, with a
+    """World in which methods practise and are scored: a dict that maps each constant that differs
+    from the paper's to one value, such as ``{"motor_noise": 0.01}``. Blocks of the suite with a
+    world of their own (table ``model`` of the block or of the suite) are left out, with a
     warning."""
 
 
@@ -153,8 +154,8 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
     CoarticError
         One of these is the case:
 
-        - a task, a method or a family is unknown, or two tasks, methods or families have the same
-          name;
+        - the suite, a task, a method or a family is unknown, its file cannot be used, or two tasks,
+          methods or families have the same name;
         - an option or a parameter of a method has a wrong value;
         - ``trials`` or a family file has no effect;
         - ``runs`` asks for runs other than run 0, although no planned method depends on a seed;
@@ -241,8 +242,7 @@ def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> li
     """Return the ids of the methods in the user's files that nothing names.
 
     If neither the request (``methods``) nor a block of the suite names a method of a file, all
-    methods of this file are returned. The wildcard ``"*"`` of the request names no method in this
-    sense.
+    methods of this file are returned. The wildcard ``"*"`` in the request does not count as a name.
     """
     files = {
         registered[method].where
@@ -289,8 +289,8 @@ def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
 def _check_trials(trials: int, jobs: Iterable[Job]) -> None:
     """Raise CoarticError if two cells differ only in their numbers of trials.
 
-    Such cells would be equal if both had ``trials`` trials. ``jobs`` are the jobs of the suite,
-    with the numbers of trials that the suite sets.
+    With ``trials`` trials, such cells would be equal. ``jobs`` are the planned jobs, with the
+    numbers of trials that the suite and the methods set.
     """
     first_jobs = dict[str, Job]()
     for job in jobs:
@@ -370,12 +370,12 @@ def _world_of(request: Request) -> MotionModel:
 
 
 def _worlds_beside(jobs: Sequence[Job], request: Request) -> list[MotionModel]:
-    """Return the motion models for methods and tasks that a request adds.
+    """Return the motion models in which methods run that a request adds to a suite.
 
     - If the request has a model, only that model is returned.
-    - If the suite has no jobs, or has a job in the paper's world, only the paper's model is
-      returned.
-    - Otherwise the models of all jobs of the suite are returned, each once.
+    - If there are no ``jobs`` of the suite, or one of them is in the paper's world, only the
+      paper's model is returned.
+    - Otherwise the models of all jobs are returned, each once.
     """
     worlds = {made.cell.world: PAPER._replace(**differences(made.cell.model)) for made in jobs}
     is_usual = request.model or not worlds or "" in worlds
@@ -399,7 +399,7 @@ def _suite_jobs(
     registered : mapping of str to MethodInfo
         Dict that maps ids to all known methods.
     own : collection of str
-        Names of the user's tasks, which belong to each block for all tasks (``*``).
+        Names of tasks that are added to each block whose ``tasks`` contain ``*``.
     task_named : callable
         Function that returns the task with a given name.
     job : callable

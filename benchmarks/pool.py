@@ -65,17 +65,16 @@ def process_pool(processes: int, context: Any = PROGRAM_CONTEXT) -> Iterator[Pro
 
     Use this context manager in programs that run methods or proofs themselves. The processes are
     started with the environment variables of workers, with which all x86-64 processors with AVX2
-    round alike. By default each process imports the main program, as ``multiprocessing`` usually
-    does. So call this function behind ``if __name__ == "__main__":``.
+    round alike. By default each process imports the main program, as the processes of
+    ``multiprocessing`` usually do. So call this function inside ``if __name__ == "__main__":``.
 
     Parameters
     ----------
     processes : int
         Number of processes.
     context : multiprocessing context
-        How processes are started. The default is ``PROGRAM_CONTEXT``. With ``CONTEXT`` the
-        processes do not import the main program
-        (both are in :mod:`coartic.benchmarks.processes`).
+        Context that starts the processes. With the default ``PROGRAM_CONTEXT`` they import the main
+        program; with ``CONTEXT`` they do not (both are in :mod:`coartic.benchmarks.processes`).
 
     Yields
     ------
@@ -103,7 +102,7 @@ class Local:
     jobs : int
         Largest number of jobs that are performed at once; -1 for the number of cores.
     timeout_s : float
-        Wall time that a job may wait in addition to three times its limit of CPU time (in s).
+        Wall time that a job may take in addition to three times its limit of CPU time (in s).
     verbose : bool
         True to show what methods print, their log messages from level INFO, and the tracebacks of
         their errors.
@@ -128,8 +127,8 @@ class Local:
         """Yield each job with the outcomes of its runs, as jobs finish.
 
         - A job is performed once more if it exceeds its limit of wall time, or if its process is
-          killed or loses the fork server. If the second attempt fails, too, the outcomes of its
-          runs have status ``timeout`` or ``crashed``.
+          killed by SIGKILL or loses the fork server. If the second attempt fails, too, the outcomes
+          of its runs have status ``timeout`` or ``crashed``.
         - If the process of a job exceeds the limit of CPU time, the outcomes have status
           ``timeout``. If the process ends for another reason, they have status ``crashed``.
         - A process that ends while it has no job is replaced.
@@ -233,11 +232,12 @@ class Local:
 
     @staticmethod
     def _replace_pool(group: _Group, running: dict[Future[Any], tuple[_Group, int, Job]]) -> None:
-        """Close the broken process pool of a group; its next job starts a new one.
+        """Close the broken process pool of a group.
 
-        The jobs of the broken pool that have no answer yet wait for the new pool. ``running`` is a
-        dict that maps the future of each such job to its group, its number and the job. Raises
-        BrokenExecutor if five pools of the group have broken since a job got an answer.
+        The next job of the group starts a new pool. The jobs of the broken pool that have no answer
+        yet are put back into the queue. ``running`` is a dict that maps the future of each running
+        job of all groups to a tuple: its group, its number and the job. Raises BrokenExecutor if
+        five pools of the group have broken since a job of the group got an answer.
         """
         error: BaseException | None = None
         for future, (of, number, job) in [*running.items()]:
@@ -257,7 +257,7 @@ class Local:
         return 3 * (job.time_limit_s or _MAX_CPU_S) + self.timeout_s
 
     def _failure(self, job: Job, error: BaseException, printed: str) -> list[Outcome]:
-        """Return the outcomes of a job that raised an error instead of returning an answer.
+        """Return the outcomes of a job that has an error instead of an answer.
 
         ``printed`` are the last lines that the process of the job wrote to standard error.
         """
@@ -295,10 +295,10 @@ class _Group:
     running: int = 0
     """Number of jobs that were given to the pool and have no answer yet."""
     folder: Path = Path()
-    """Folder of temporary files. The file ``NUMBER-PID`` has what job NUMBER writes to standard
-    error in process PID."""
+    """Folder of temporary files. The file ``NUMBER-PID`` contains what job NUMBER writes to
+    standard error in process PID."""
     broken_pools: int = 0
-    """Number of pools of the group that broke since a job got an answer."""
+    """Number of pools of the group that have broken since a job of the group got an answer."""
     _pool: Any = None
 
     @property
@@ -377,8 +377,8 @@ def _begin_plainly() -> None:
 def _begin(folder: Path, workers: int, verbose: bool) -> None:
     """Set up a process that performs jobs.
 
-    - The current folder of the process is a new folder in ``folder``.
-    - The process prints only if ``verbose`` is True.
+    - The current folder of the process becomes a new folder in ``folder``, unless the disk is full.
+    - What the process prints is shown only if ``verbose`` is True.
     - The limit of the memory for its data is 80 % of the machine's memory divided by the number of
       ``workers``, but at least 1 GiB.
     """
@@ -409,8 +409,8 @@ def _answer_to(folder: Path, number: int, job: Job, verbose: bool) -> bytes:
     Parameters
     ----------
     folder : Path
-        Folder for a file with what the job writes to standard error. The file is removed when the
-        job has an answer.
+        Folder in which a file is made with what the job writes to standard error. The file is
+        removed when the job has an answer.
     number : int
         Number of the job, for the name of that file.
     job : Job

@@ -17,5 +17,5 @@ os.close(_nobody)
 
 
 def show_errors() -> None:
-    """Connect standard error of this process to that with which the fork server started."""
+    """Connect standard error of this process to the one with which the fork server started."""
     os.dup2(_ERRORS, 2)

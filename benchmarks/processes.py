@@ -1,4 +1,4 @@
-"""Worker processes, which round alike and import no modules from the current folder."""
+"""Worker processes, which round numbers alike and do not search the current folder for modules."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ def _start(process: Any, main: ModuleType) -> Any:
 class _WorkerContext(type(_BASE)):  # type: ignore[misc]
     """Context of ``multiprocessing`` for worker processes.
 
-    Before a lock is made, the context starts Python's resource tracker. This process must not
-    import modules from the current folder either.
+    Before a lock is made, the context starts Python's resource tracker, a further process, so that
+    it does not import modules from the current folder either.
     """
 
     Process = WorkerProcess
@@ -108,7 +108,7 @@ PROGRAM_CONTEXT: Any = _ProgramContext()
 def signal_name(number: int) -> str:
     """Return the name of a signal, such as ``SIGKILL`` for 9.
 
-    A signal without a name is called by its number, such as ``signal 40``.
+    The name of a signal that Python does not know is its number, such as ``signal 40``.
     """
     try:
         return signal.Signals(number).name

@@ -124,8 +124,9 @@ def arithmetic() -> str:
     """Return a fingerprint of how workers round, in the form ``NumPy HASH, libm HASH``.
 
     A new process with the environment variables of a worker computes some numbers by NumPy, and
-    some by the C library (libm). Each hash is computed from the bits of these numbers. If the hash
-    of a library is the same on two machines, the library rounds these numbers alike on both.
+    some by the C library (libm). Each of the two hashes is computed from the bits of the numbers of
+    one library. If the hash of a library is the same on two machines, the library rounds these
+    numbers alike on both.
     """
     with process_pool(1, CONTEXT) as pool:
         return pool.submit(_arithmetic).result()

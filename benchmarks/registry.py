@@ -22,8 +22,8 @@ _RESERVED = (METHOD_PREFIX, "optimum/")
 """Prefixes that only ids of built-in methods may have, because tables interpret these prefixes."""
 METHOD_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")
 NAMES = ("CMA-ES", "learner", "optimum")
-"""Names that are used for built-in methods in figures and tables. No other method may have one of
-them as its id."""
+"""Names of built-in methods in figures and tables, which no method of the user may have as its
+id."""
 
 
 Registry = Mapping[str, MethodInfo]

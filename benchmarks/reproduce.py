@@ -75,8 +75,8 @@ def perform_in_order(
 ) -> Iterator[tuple[Job, Row]]:
     """Perform jobs in one process for each method, and yield the scored runs.
 
-    A process performs the jobs of its method in the order of ``jobs``. If the process ends, a new
-    process performs the remaining jobs. The runs are not stored.
+    The jobs of a method are performed in the order of ``jobs``. If the process of a method ends, a
+    new process performs its remaining jobs. The runs are not stored.
 
     Parameters
     ----------
@@ -148,9 +148,10 @@ def perform_runs_again(runs: Sequence[Row], registered: Registry) -> Iterator[tu
 def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
     """Select stored runs of a folder that can be performed here: every k-th run.
 
-    A run of the plan can be performed here if ``registered`` contains its method with the same
-    version or code. If n runs can be performed, k is n divided by ``count``, rounded down, but at
-    least 1; at most ``count`` runs are selected.
+    A run of the folder's plan can be performed here if ``registered`` contains its method with the
+    same version or code. If n runs can be performed, k is n divided by ``count``, rounded down, but
+    at least 1. Every k-th run is selected, beginning with the first one, until there are ``count``
+    runs.
 
     Parameters
     ----------
@@ -191,8 +192,8 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
 def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int, list[str]]:
     """Execute solutions of a folder with motor noise again, and compare the mean ticks.
 
-    The seed of the noise of a run is the same as in the scoring of the run (:func:`.with_noise`).
-    If the stored ticks of a run follow another version of the rule of noise, they are not compared.
+    The seed of the noise of a run is the same as when the run was scored (:func:`.with_noise`). If
+    the stored ticks of a run follow another version of the rule of noise, they are not compared.
 
     Parameters
     ----------
@@ -205,7 +206,8 @@ def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int,
     Returns
     -------
     int
-        Number of solutions that were passed to :func:`.with_noise`.
+        Number of solutions that were passed to :func:`.with_noise`, which executes nothing in a
+        world without motor noise that is not the paper's.
     list of str
         A sentence for each number that differs from the stored one.
 
@@ -239,8 +241,8 @@ def compare_runs(a: Row, b: Row) -> list[str]:
 
     - The ticks with motor noise are compared only if both runs have the same id and the same rule
       of noise.
-    - If one of the runs stores only some of its rewards, only these rewards are compared
-      (:meth:`.Row.downsample`).
+    - If one of the runs stores only some of its rewards, only the rewards that
+      :meth:`.Row.downsample` keeps are compared.
 
     Parameters
     ----------

@@ -35,11 +35,11 @@ from coartic.runs.record import UNREPEATED, Row
 from coartic.runs.store import Store, open_store_for_writing
 
 _MIN_BATCH = 8
-"""If a method makes many runs side by side, a job has at least this number of runs, unless its cell
-has fewer."""
+"""Smallest number of runs that :func:`_divided` puts into a job, except for the last part of a
+divided job, and for methods that allow only fewer runs."""
 _MAX_TRIALS = 400_000
-"""Largest number of trials of a job that has more than :data:`_MIN_BATCH` runs. These trials take
-some seconds; an interruption loses the runs of the jobs that are being performed."""
+"""Largest number of trials of a job that has more than :data:`_MIN_BATCH` runs. So many trials take
+some seconds. An interruption loses the runs of the jobs that are being performed."""
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
 
@@ -54,9 +54,9 @@ class Progress:
     """Number of runs of the plan that the folder had before this call, without the stored runs that
     are performed again."""
     outdated: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    """Numbers of the planned runs that another version or code of their method has made. The keys
-    are triples: id of the method, version (or code) that made the runs, and version in the plan.
-    These runs stay in the folder, but reports do not show them."""
+    """Counter of the planned runs that another version (or code) of their method made, keyed by
+    triples: id of the method, version that made the runs, and version in the plan. These runs stay
+    in the folder, but reports do not show them."""
     done: int = 0
     """Number of runs that this call has performed so far."""
     failed: int = 0
@@ -66,14 +66,14 @@ class Progress:
     marks: dict[str, list[str]] = field(default_factory=dict)
     """Dict that maps methods to warnings about their runs in the folder (:meth:`Store.marks`)."""
     others: int = 0
-    """Runs in the folder that the plan does not ask for, without :attr:`outdated` runs."""
+    """Number of runs in the folder that the plan does not ask for, without :attr:`outdated`."""
     wall_s: float = 0.0
     """Wall time of the call, in s; 0 until the call ends."""
     time_left: TimeLeft = field(default_factory=TimeLeft)
     """Estimate of the wall time until all runs are performed."""
     repeats: int = 0
-    """Number of runs that are still to be repeated. For each method from a file, one run is
-    performed a second time, to check that it gives the same result."""
+    """Number of runs that are still to be repeated (:func:`perform`): for each method from a file,
+    one run is performed a second time, to check that it gives the same result."""
 
     def count(self, status: str) -> None:
         """Count a run of the plan in :attr:`failed` and :attr:`crashed` by its status."""
@@ -183,8 +183,8 @@ def perform(
     - *Plan.* ``plan`` replaces the plan that is stored in the folder. Runs that the new plan does
       not ask for stay in the folder, but reports do not show them.
     - *Failures.* Runs that fail are stored and counted; no error is raised. The next call performs
-      two kinds of runs again: runs that crashed, and runs that timed out under a limit of CPU time
-      below the limit in the new plan.
+      two kinds of runs again, if the code of their method is available: runs that crashed, and runs
+      that timed out under a limit of CPU time below the limit in the new plan.
     - *Interruption.* Runs that finished before an interruption are stored.
     - *Motor noise.* If the stored mean ticks of a run follow another version of the rule of noise,
       they are computed again.
@@ -218,9 +218,16 @@ def perform(
         One of these is the case:
 
         - the plan has no jobs, or ``executor`` is neither a Local nor a Dask;
-        - the folder contains something else, or cannot be written;
+        - the folder contains other files or results of another suite, or cannot be written;
         - another process writes into the folder;
-        - the code of a method with missing runs is not available here.
+        - the code of a method with missing runs is not available here;
+        - the executor cannot perform jobs (:meth:`.Local.perform`, :meth:`.Dask.perform`).
+
+    Warns
+    -----
+    UserWarning
+        The repetition of a run differs, other runs of a method were made with other versions of the
+        packages that its file imports, or ``watch`` raised an exception.
     """
     folder, started = folder_named(folder), time.perf_counter()
     watchers = [watch] if watch else []
@@ -298,7 +305,7 @@ def _repeat_runs(
     workers: int,
     tell: Callable[[Cell | None], None],
 ) -> None:
-    """Perform a run of each method from a file again, and mark differences.
+    """Perform a run of each method from a file again, and store differences.
 
     Parameters
     ----------
@@ -330,13 +337,13 @@ def _repeat_runs(
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return a job for each cell of a plan in which runs have to be performed.
+    """Return a job for each planned cell in which runs have to be performed.
 
     A run has to be performed in two cases:
 
     - The run is not stored.
-    - The stored run crashed, or timed out under a lower limit of CPU time than that of the plan,
-      and the code of the method is available here.
+    - The stored run crashed, or timed out under a lower limit of CPU time than the limit of the
+      plan, and the code of the method is available here.
 
     All other runs of the plan are counted in ``progress``. Raises CoarticError if a run has to be
     performed, and the code of its method is not available here.
@@ -372,8 +379,9 @@ def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
 
     - *Size.* Many methods need less time for many runs side by side than for the same runs one by
       one. So a job has as many runs as the method allows: :meth:`.Method.max_batch` for a built-in
-      method, and one run for a method from a file. A job is smaller if it would take more than
-      some seconds, or if some of the ``workers`` processes would get no runs.
+      method, and one run for a method from a file. A job has fewer runs, but as a rule at least 8,
+      if it would take more than some seconds, or if some of the ``workers`` processes would get no
+      runs.
     - *Order.* Jobs with more trials start earlier, so that no long job is left alone at the end.
       Jobs of methods without a number of trials, such as planners, start first, because one run of
       such a method can take as long as thousands of trials.

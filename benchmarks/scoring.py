@@ -33,7 +33,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Row]:
 
     - A part that is too long or breaks the rules of the task is not executed; the run then has
       status ``solver-failed``.
-    - Movements and a score are returned only for runs whose final status is ``ok``.
+    - A row contains movements and a score only if the final status of its run is ``ok``.
     - In a world with motor noise, only the solution is scored: the movements that the method
       recommends to make next. These movements are stored without ticks, and corrective movements
       also without targets.
@@ -84,16 +84,20 @@ def _answer_of(outcome: Outcome) -> dict[str, list[Movement]]:
 
 
 def with_noise(runs: Sequence[Row]) -> list[Row]:
-    """Execute each solution 100 times with motor noise, and add the mean ticks.
+    """Execute each solution 100 times with motor noise, and set the columns of mean ticks.
 
     - In the paper's world, ``noisy_ticks`` is the mean number of ticks over the executions with
       motor noise 0.01, or None if one of them fails. The seed of the noise is the hexadecimal
       number before the hyphen in the id of the run.
     - In a world with motor noise, ``mean_ticks`` is the mean number of ticks over the executions in
-      this world, and ``failed_executions`` is the number of failed executions. For a failed
-      execution, twice the ticks of the corrective process with its best hands are used. The seed of
-      the noise is :func:`.judge_seed`, the same for all methods.
-    - In any other world nothing is executed.
+      this world, and ``failed_executions`` is the number of failed executions. A failed execution
+      counts as twice the ticks of the corrective process with its best hands (if that process
+      completes the task with no hands, ``mean_ticks`` is None). The seed of the noise is
+      :func:`.judge_seed`, the same for all methods.
+    - In any other world nothing is executed, and the runs are returned unchanged.
+
+    In the first two cases, column ``noise_rule`` is set to the version of the rule of noise,
+    :data:`.NOISE_RULE`.
 
     Parameters
     ----------
@@ -104,7 +108,7 @@ def with_noise(runs: Sequence[Row]) -> list[Row]:
     Returns
     -------
     list of Row
-        Copies of the runs in which these columns are set.
+        Copies of the runs in which these columns are set, in the order of ``runs``.
     """
     solved = [run for run in runs if "solution" in run.movements]
     if not solved:

@@ -60,9 +60,9 @@ _Number = Annotated[int, Field(ge=1, strict=True)]
 def _worlds(value: Any) -> tuple[MotionModel, ...]:
     """Validate a table ``model``, and return the worlds that it describes.
 
-    The table maps constants (:data:`.WORLD`) to a value or to a list of values. The result contains
-    a world for each combination of the values. A tuple of worlds is returned unchanged. Raises a
-    validation error for an unknown constant, a wrong value or an empty table.
+    The table maps each constant (:data:`.WORLD`) to a value or to a list of values. The result
+    contains a world for each combination of the values. A tuple of worlds is returned unchanged.
+    Raises a validation error for an unknown constant, a wrong value or an empty table.
     """
     if isinstance(value, tuple) and all(isinstance(world, MotionModel) for world in value):
         return value
@@ -163,12 +163,12 @@ _TAKEN_BY = {
     "method file": "coartic check METHOD --method-file {}",
     "shipped family": "coartic list {}",
 }
-"""Dict that maps each kind of name (:func:`kind_of`) to the command that accepts such a name. The
-``{}`` in a command stands for the name."""
+"""Dict that maps each kind of name (:func:`kind_of`) to a command that accepts such a name. The
+name takes the place of ``{}`` in the command."""
 
 
 def kind_of(name: str) -> str:
-    """Return what kind of thing the name of a user stands for.
+    """Return what kind of thing a name that a user typed stands for.
 
     Parameters
     ----------
@@ -208,10 +208,10 @@ def kind_of(name: str) -> str:
 
 
 def check_kind(name: str, *kinds: str) -> None:
-    """Raise CoarticError if a name stands for a thing of another kind than ``kinds``.
+    """Raise CoarticError if the kind of a name is not one of ``kinds``.
 
-    The kinds are those of :func:`kind_of`. The error message says which command accepts the name.
-    Nothing is raised for a name whose kind is not known.
+    :func:`kind_of` determines the kind. The error message says which command accepts the name. For
+    a name of unknown kind nothing is raised.
     """
     kind = kind_of(name)
     if kind and kind not in kinds:
@@ -294,7 +294,8 @@ def tasks_of(block: _Block, own: Collection[str], task_named: TaskNamed) -> Iter
     Yields
     ------
     Task
-        The tasks, in the order of the block. A task that is named twice is yielded once.
+        The tasks, in the order of the block. A task that is named twice is yielded once. Tasks with
+        a number of goals that the block does not allow (``goals``) are left out.
 
     Raises
     ------

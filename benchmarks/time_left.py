@@ -20,8 +20,8 @@ _EARLY = 0.1
 """Until this share of the work is done there is no estimate, because at first processes are
 starting."""
 _RECENT = 0.15
-"""Half-life of the weight of a finished run, as a share of the time of all finished runs. Earlier
-runs have less weight, because the load of a machine changes."""
+"""Half-life of the weight of a finished run, as a share of the total time of all finished runs.
+Earlier runs have less weight, because the load of a machine changes."""
 
 
 class TimeLeft:
@@ -33,11 +33,12 @@ class TimeLeft:
     - *Method with shipped results.* The expected time of a run is the mean time of the shipped runs
       of the method on this task (on all tasks, if none are shipped for this one), in proportion to
       the number of trials, times a factor of this machine. The factor is the same for all such
-      methods: the time of the finished runs divided by the time of such runs in the shipped
+      methods: the time of their finished runs divided by the time of such runs in the shipped
       results.
-    - *Any other method.* The expected time is the mean time of the method's own finished runs, in
-      proportion to the number of trials.
-    - *Weights.* In both means, recent runs have more weight than earlier runs.
+    - *Any other method.* The expected time of a run is the mean time of the finished runs of this
+      method, in proportion to the number of trials.
+    - *Weights.* In the factor, and in the mean time of finished runs, recent runs have more weight
+      than earlier runs.
     - *Runs at once.* The number of runs that are made at once is ``workers`` or, if that is larger,
       the total time of the finished runs divided by the elapsed wall time.
 
@@ -113,7 +114,7 @@ class TimeLeft:
         return max(left_s / at_once - since_s, since_s / 4)
 
     def _factor(self, method: str) -> float:
-        """Return the factor between the times of finished runs and their :func:`_shipped_s`.
+        """Return the weighted time of finished runs, divided by the weighted :func:`_shipped_s`.
 
         The finished runs are those of the method's group (:func:`_group_of`). The factor is NaN
         before the first run of the group has finished.
@@ -125,8 +126,8 @@ class TimeLeft:
 def _group_of(method: str) -> str:
     """Return the name of the group of methods to which a method belongs.
 
-    All methods of :func:`_shipped_means` are one group, whose name is empty. Any other method is a
-    group of its own, whose name is the id of the method.
+    All methods of :func:`_shipped_means` belong to one group, whose name is empty. Any other method
+    is a group of its own, and the name of the group is the id of the method.
     """
     return "" if method in _shipped_means() else method
 
@@ -151,9 +152,10 @@ def _shipped_s(kind: _Kind) -> float:
 
 @cache
 def _shipped_means() -> Mapping[str, Mapping[str, float]]:
-    """Return the mean wall times of shipped runs (in s), keyed by method, then task.
+    """Return the mean wall times of shipped runs (in s) for each method and task.
 
-    The means are over the shipped runs in the paper's world with the default parameters.
+    The result is a dict that maps ids of methods to dicts that map names of tasks to means. The
+    means are over the shipped runs in the paper's world with the default parameters.
     """
     with open_shipped("comparison") as store:
         runs = store.runs()

@@ -55,7 +55,7 @@ def fail(
     wall_s: float | None = None,
     cpu_s: float | None = None,
 ) -> list[Outcome]:
-    """Return the outcomes of the runs of a job that has no usable answer.
+    """Return an outcome for each run of a job that has no usable answer.
 
     Parameters
     ----------
@@ -118,8 +118,9 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
 def perform_job(job: Job) -> list[Outcome]:
     """Perform the runs of a job in this process, and return their outcomes.
 
-    An error that the method raises is not raised here: it becomes the outcome of the run. If the
-    job has several runs, the method makes all of them in one call (:meth:`.Method.solve_together`).
+    An error that the method raises is not raised here: it determines the status and the reason of
+    the outcomes. If the job has several runs, the method makes all of them in one call
+    (:meth:`.Method.solve_together`).
 
     Parameters
     ----------

@@ -8,27 +8,26 @@ A condition defines
 
 *Informed conditions* combine informed and uninformed search, which the paper leaves to "future
 research" (section *Integrating Informed and Uninformed Search*). They use null-space projection to
-move the base and the chosen arm towards a preferred posture, in two places. The mean of
-exploration, which is t in the paper, becomes ::
+move the base and the chosen arm towards a preferred posture, in two places. First, the mean of
+exploration, which in the paper is the stored target t, becomes ::
 
     t + κ N(t) (p - t)
 
-and each iteration of the corrective process adds the term ::
+Second, each iteration of the corrective process adds to its configuration x the term ::
 
     β N(x) (p - x)
 
-where
+Here
 
 - p is the preferred posture, which is chosen when a goal becomes current;
-- t is the stored target, and x is the present configuration;
 - N = I − J⁺J is the projection onto the null space of the Jacobian J of the chosen hand. Like the
-  paper's distance in joint space, it mixes lengths and angles.
+  paper's distance in joint space, the projection mixes lengths and angles.
 
 Two *ablations*, which are not in the paper, each change one part of the learner:
 
 - *uncorrected*: a movement to a stored target that misses its goal is not corrected;
-- *subtask*: the learner learns from the reward of each subtask. The paper calls it crucial that the
-  learner learns from the overall reward.
+- *subtask*: the learner learns from the reward of each subtask, that is, of the movements to one
+  goal. The paper calls it crucial that the learner learns from the overall reward.
 """
 
 from __future__ import annotations
@@ -56,9 +55,10 @@ if TYPE_CHECKING:
     from coartic.tasks.task import Task
 
 METHOD_PREFIX = "dual-process/"
-"""Prefix of the names of the learner's methods; the id of the exploration condition follows."""
+"""Prefix of the ids of the learner's methods. After the prefix comes the id of the exploration
+condition, or ``custom``."""
 MAX_NOISE = 100.0
-"""Largest standard deviation of noise that is accepted, in length units and rad."""
+"""Largest allowed standard deviation of exploration noise, in length units and rad."""
 Share = Annotated[float, Field(ge=0, le=1)]
 Drift = Annotated[float, Field(ge=0, le=10)]
 
@@ -106,17 +106,17 @@ class ExplorationCondition:
     hands: Annotated[tuple[Hand, ...], Field(min_length=1)]
     """Hands that the learner uses."""
     modify_chosen: bool
-    """True if noise moves the targets of the free base and of the arm that is to hit
-    (AModChosen)."""
+    """True if noise is added to the targets of the base (its coordinates that are not locked) and
+    of the chosen arm, whose hand is to hit the goal (AModChosen)."""
     modify_other: bool
-    """True if noise moves the targets of the other arm (AModOther); False if the other arm does not
-    move."""
+    """True if noise is added to the targets of the other arm (AModOther). If False, the other arm
+    does not move."""
     hand_exploration: Literal["none", "closest", "random", "nearest-posture"]
     """Which hand is tried for a goal when the hand is explored, which happens with probability
     ``epsilon``:
 
     - ``"none"``: hands are not explored;
-    - ``"closest"``: the hand closest to the goal;
+    - ``"closest"``: the hand closest to the goal, or a random hand if both are equally close;
     - ``"random"``: a random hand (DASel);
     - ``"nearest-posture"``: the hand for which the posture that the corrective process finds at the
       goal is nearest to the present posture in joint space.
@@ -127,19 +127,19 @@ class ExplorationCondition:
     """Standard deviation of the noise η (published), in length units (base) and rad (joints)."""
     corrects: bool = True
     """True if the corrective process **A** acts when a movement to a stored target misses its goal.
-    If False, a trial with such a movement fails, and **A** acts only in trial 0 and where no target
-    is stored for the state and the hand."""
+    If False, a trial fails when such a movement misses, and **A** acts only in trial 0 and at goals
+    for which no target is stored for the state and the hand."""
     learned: Literal["best", "replay"] = "best"
     """Which trial is the solution of a run: the best trial (``"best"``), or a greedy trial without
     exploration that is made after the last trial (``"replay"``)."""
     credit: Literal["overall", "subtask"] = "overall"
-    """Credit assignment: the reward from which the value Q(s, a) is learned at a goal. It is the
-    reward R of the whole trial (``"overall"``), or the return of the goal (``"subtask"``, see
-    ``discount``)."""
+    """Credit assignment: from which reward the value Q(s, a) is learned at a goal. It is the reward
+    R of the whole trial (``"overall"``), or the return of the goal (``"subtask"``; ``discount``
+    defines the return)."""
     discount: Share = 0.0
     """Discount factor γ. The return of goal g is Σ γ^|h − g| r_h, where r_h is the reward of the
-    movements to goal h. With γ = 0 the return is the reward of the subtask itself. A value above 0
-    needs credit ``"subtask"``.
+    movements to goal h. With γ = 0 the return is r_g, the reward of the subtask itself. A value
+    above 0 needs credit ``"subtask"``.
     """
     counted: Literal["later", "all"] = "later"
     """Goals h over which the return of goal g is summed: g and all later goals (``"later"``), or
@@ -147,15 +147,17 @@ class ExplorationCondition:
     each return is R."""
     drift: Drifts = 0.0
     """κ, gain of null-space exploration: the fraction of the null-space displacement to the
-    preferred posture by which the mean of exploration is moved. If κ is a tuple, each trial after
-    trial 0 draws one of its numbers."""
+    preferred posture by which the mean of exploration is moved. If κ is a tuple, one of its numbers
+    is drawn at random for each trial after trial 0."""
     pull: Share = 0.0
     """β, gain of null-space correction: the fraction of the null-space displacement to the
-    preferred posture that is added in each iteration of the corrective process, after trial 0."""
+    preferred posture that each iteration of the corrective process adds, in all trials after trial
+    0."""
     direction: Literal["next-goal", "stay", "start"] = "next-goal"
     """The preferred posture:
 
-    - ``"next-goal"``: halfway to the stored target of the next goal, if there is one;
+    - ``"next-goal"``: halfway from the robot's configuration to the stored target of the next goal;
+      if there is no such target, the same as ``"stay"``;
     - ``"stay"``: the configuration of the robot when the goal becomes current;
     - ``"start"``: the configuration at the start of the trial, as a control with wrong information.
     """
@@ -185,7 +187,7 @@ class ExplorationCondition:
 
     @property
     def drifts(self) -> tuple[float, ...]:
-        """The values of field ``drift`` (κ) as a tuple, also for a single number."""
+        """The values of ``drift`` (κ) as a tuple, even if there is only one."""
         return self.drift if isinstance(self.drift, tuple) else (self.drift,)
 
     @property
@@ -194,7 +196,7 @@ class ExplorationCondition:
         return any(self.drifts) or self.pull > 0
 
     def inapplicable_reason(self, task: Task | Outline) -> str | None:
-        """Return why the condition does not apply to a task's hands; None if it applies."""
+        """Return why the condition does not fit a task's hands; None if it fits."""
         missing = [hand for hand in self.hands if hand not in task.hands]
         if missing:
             return (
@@ -224,8 +226,8 @@ VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
     # A learner of subtasks must not choose its solution by the reward of the whole task.
     "subtask": ("subtask reward", {"credit": "subtask", "learned": "replay"}),
 }
-"""Dict that maps the name of each ablation to a phrase for its title, and to a dict that maps the
-changed fields of EC1 or EC4 to their values."""
+"""Dict that maps the name of each ablation to a tuple: a phrase for its title, and a dict that maps
+the changed fields of EC1 or EC4 to their values."""
 ABLATIONS = {
     f"{base}-{name}": replace(CONDITIONS[base], id=f"{base}-{name}", **fields)
     for base in ("EC1", "EC4")
@@ -236,13 +238,13 @@ INFORMED = {
     f"{base}-informed": replace(CONDITIONS[base], id=f"{base}-informed", drift=1.0)
     for base in ("EC1", "EC4")
 }
-"""Informed conditions: EC1 and EC4 with null-space exploration. The preferred posture is halfway to
-the posture at the next goal, because the shortest path is straight. So these conditions use the
-formula of the reward.
+"""Dict that maps ids to the informed conditions: EC1 and EC4 with null-space exploration. The
+preferred posture is halfway to the posture at the next goal, because the shortest path is straight.
+So these conditions use the formula of the reward.
 
 Their ``drift`` was chosen among 0.1, 0.3 and 1 by the mean gap after 10,000 trials on development
 instances d000 to d009 of five families, three runs each (``studies/dial/development.toml``). The
-gaps were 6.8, 4.2 and 4.0 %.
+mean gaps were 6.8, 4.2 and 4.0 %, in this order.
 """
 EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 """Dict that maps the ids of all conditions to the conditions."""
@@ -251,8 +253,8 @@ EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
     """Return the exploration condition with an id, such as ``"EC4"`` or ``"dual-process/EC4"``.
 
-    If the argument is a condition already, it is returned unchanged. Raises CoarticError for an
-    unknown id, and TypeError for an object that is neither a string nor a condition.
+    A condition that is passed is returned unchanged. Raises CoarticError for an unknown id, and
+    TypeError for an object that is neither a string nor a condition.
     """
     if isinstance(condition, ExplorationCondition):
         return condition

@@ -5,22 +5,25 @@ trial, the learner chooses a hand, perturbs the target configuration that is sto
 and moves to it. If the hand misses the goal, the corrective process **A** moves it into the goal
 (:mod:`coartic.motion.kernels.trial`).
 
-The learner stores a table keyed by state (the goal and the previous hand) and hand. An entry is the
-value Q and the target q*. A completed trial is compared, in each state that it passed through, with
-all earlier trials that chose the same hand in this state: by the total reward or, in an ablation,
-by the return of the goal. If the trial is better than all of these earlier trials, its reward (or
-return) and its configuration at the goal replace Q and q* in the table.
+The learner stores a table keyed by state (the goal and the previous hand) and hand. An entry
+consists of the value Q and the target q*. In each state that a completed trial passed through, the
+trial is compared with all earlier completed trials that chose the same hand in this state. They are
+compared by their total rewards or, in an ablation, by their returns of the goal. If the trial is
+better than all of these earlier trials, its reward (or return) and its configuration at the goal
+replace Q and q* in the table.
 
 One call of a compiled kernel by :mod:`coartic.learner.learning` makes many runs side by side: the
 outer loop is over trials, then over goals, then over runs. Each run draws random numbers from its
 own NumPy generator (``default_rng(seed)``, PCG64), in this order:
 
-1. if the condition has several values of ``drift``, at the beginning of each trial after trial 0: a
-   uniform number that chooses one;
-2. for each goal of each trial after trial 0, if hands are explored: a uniform number that is
-   compared with ε;
-3. if that number is below ε and a hand is chosen at random: a uniform number that chooses the hand;
-4. if a target is stored: a standard normal number per explored joint, in the order of ``q``.
+1. at the beginning of each trial after trial 0, if the condition has several values of ``drift``: a
+   uniform number that chooses one of these values;
+2. at each goal of such a trial, up to the first goal that is missed, if hands are explored: a
+   uniform number that is compared with ε;
+3. at the same goal, if that number is below ε and a hand is chosen at random: a uniform number that
+   chooses the hand;
+4. at the same goal, if a target is stored: a standard normal number for each explored joint, in the
+   order of ``q``.
 
 Runs share no data, so that the result of a run depends neither on the other runs nor on their
 number. Motor noise does not come from this generator (:mod:`coartic.motion.kernels.noise`).
@@ -107,10 +110,11 @@ class LearnerParameters(NamedTuple):
     hands: Hands
     """Hands that may be used, shape ``(1,)`` or ``(2,)``."""
     follows: Flags
-    """True for each joint whose target is its present value, shape ``(2, width)``, a row for each
-    chosen hand."""
+    """True for each entry of a configuration whose target is its present value, shape ``(2,
+    width)``. Row h holds if hand h (0 left, 1 right) is chosen."""
     explored: Flags
-    """True for each joint that noise perturbs, shape ``(2, width)``, a row for each chosen hand."""
+    """True for each entry of a configuration to which noise is added, shape ``(2, width)``. Row h
+    holds if hand h (0 left, 1 right) is chosen."""
     exploration: int
     """Exploration of the hand: 0 none, 1 random, 2 closest, 3 nearest posture."""
     epsilon: float
@@ -123,16 +127,16 @@ class LearnerParameters(NamedTuple):
     """True if Q of a goal is learned from the return of the goal, not from the reward of the
     trial."""
     discount: float
-    """γ of the return of a goal."""
+    """Discount factor γ in the return of a goal."""
     counts_earlier: bool
     """True if the return of a goal includes the rewards of earlier goals."""
     nullspace_exploration_gains: Array
-    """Values of κ, shape ``(K,)``; if K > 1, each trial draws one."""
+    """Values of κ, shape ``(K,)``; if K > 1, one of them is drawn for each trial after trial 0."""
     nullspace_correction_gain: float
-    """β: fraction of the null-space distance to the preferred posture that an iteration of **A**
-    adds."""
+    """β: fraction of the null-space displacement to the preferred posture that an iteration of
+    **A** adds."""
     direction: int
-    """Preferred posture: 0 next goal, 1 stay, 2 start."""
+    """Kind of the preferred posture: 0 next goal, 1 stay, 2 start."""
 
 
 class Results(NamedTuple):
@@ -155,8 +159,8 @@ class Results(NamedTuple):
     best_accounts: NDArray[np.void]
     """Per-goal records of the best trial, if there is one, shape ``(N, G)``."""
     last_records: NDArray[np.void]
-    """Per-goal records of the latest trial, shape ``(N, G)``. After the last call this is the
-    replay."""
+    """Per-goal records of the latest trial, shape ``(N, G)``. At the end of :func:`learn_kernel`
+    this is the replay."""
 
 
 class _Workspace(NamedTuple):
@@ -230,7 +234,7 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
 
 
 def workspace_for(runs: int, task: Task) -> _Workspace:
-    """Return new arrays in which the kernel makes at most 72 runs of a task."""
+    """Return new arrays for a kernel that makes ``runs`` runs, at most 72."""
     return _Workspace(
         batch=batch_for(task.robot, runs),
         counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),
@@ -264,8 +268,8 @@ def _nearest_posture(
 
     The posture of a hand at the goal of run ``n`` is the one that the corrective process **A**
     finds. Distances are Euclidean in joint space. At a tie, and if **A** fails with all hands, the
-    result is the first hand. Iterations and evaluations are counted. The run does not move, but its
-    ``hand``, ``converged`` and ``iterations`` change in place.
+    result is the first hand. Iterations and evaluations are counted. The run does not move, but
+    ``hand``, ``converged``, ``iterations`` and ``evaluations`` of its record change in place.
     """
     nearest, batch, least = learner.hands[0], workspace.batch, math.inf
     run = batch.runs[n]
@@ -336,11 +340,11 @@ def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) 
     - *start*: the posture at the start of the trial;
     - *next goal*: (q + t') / 2. Here t' is the target that is stored for the next goal and for the
       hand with the highest value Q at the next goal. If there is no next goal or no stored target,
-      p is q. In the joints that are not explored with that hand, p is q as well.
+      p is q. In the entries that are not explored with that hand, p is q as well.
 
     ``number`` is the index of the goal, from 0. ``table`` is an array of records with the fields
     ``value`` and ``target``, shape ``(G, 3, 2)``; its axes are goal, previous hand (0 left, 1
-    right, 2 none) and hand. If both gains are 0, the function changes nothing.
+    right, 2 none) and hand. If both null-space gains of the run are 0, nothing changes.
     """
     if run.nullspace_exploration_gain == 0.0 and run.nullspace_correction_gain == 0.0:
         return
@@ -409,8 +413,8 @@ def aim(
 
     The target is the stored target q*(s, a), except that an idle arm keeps its present posture if
     the condition does not modify it. If no target is stored, only the corrective process acts. If
-    ``explore`` is True, the hand is explored (:func:`choose_hand`), the target is moved towards the
-    preferred posture (:func:`explore_nullspace`), and noise η is added to it.
+    ``explore`` is True, the hand is explored (:func:`choose_hand`), a stored target is moved
+    towards the preferred posture (:func:`explore_nullspace`), and noise η is added to it.
 
     ``n`` is the index of the run in ``workspace.batch.runs``, ``number`` the index of the goal,
     ``previous`` the previous hand (0 left, 1 right, 2 none), and ``table`` as in :func:`prefer`.
@@ -446,8 +450,9 @@ def make_trial(
 
     A trial ends at the first goal that is missed. This function fills the per-goal records
     ``records``, shape ``(N, G)``, and the counts in ``workspace``. In trial 0, the hands and
-    targets are those in ``learner``. If ``explore`` is False, the trial is greedy, without drift
-    and noise of exploration. Other arguments are as in :func:`learn_kernel`.
+    targets are those in ``learner``. If ``explore`` is False, the trial is greedy: without
+    null-space exploration (κ) and without exploration noise. Other arguments are as in
+    :func:`learn_kernel`.
     """
     batch, counts, runs, initial = workspace.batch, workspace.counts, len(tables), trial == 0
     for n in range(runs):
@@ -521,10 +526,10 @@ def _learn_from(
 ) -> None:
     """Enter a trial of each run into the results, and learn from it.
 
-    ``number`` is the number of the trial, from 0. For each state that a completed trial passed
-    through and the hand that it chose there, the reward of the trial (or the return of the goal) is
-    compared with Q. If the reward is higher, it replaces Q in ``tables``, and the configuration at
-    the hit replaces q*.
+    ``number`` is the number of the trial, from 0. In each state that a completed trial passed
+    through, its reward (or its return of the goal) is compared with Q of the hand that it chose. If
+    the reward (or return) is higher, it replaces Q in ``tables``, and the configuration at the hit
+    replaces q*.
     """
     later_trials = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // later_trials
@@ -562,8 +567,8 @@ def learn_kernel(
 ) -> None:
     """Make all trials of N runs, then the replay of each run.
 
-    The replay is a greedy trial without exploration noise. If there are 0 trials, trial 0 takes the
-    place of the replay.
+    The replay is a greedy trial without exploration noise. If ``results`` has room for 0 trials,
+    trial 0 takes the place of the replay.
 
     Parameters
     ----------

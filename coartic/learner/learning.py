@@ -54,7 +54,7 @@ _MAX_BATCH_TRIALS = 4_000_000  # trials of runs whose rewards fit into one answe
 
 
 def runs_at_once(trials: int) -> int:
-    """Return how many runs of ``trials`` trials a job of a worker has at most.
+    """Return the largest number of runs of ``trials`` trials in a job of a worker.
 
     The number is from 1 to 72. A job of more than one run makes at most 4,000,000 trials in all.
 
@@ -92,10 +92,10 @@ def learn(
     model : MotionModel
     start : sequence of Movement
         A first solution, such as that of a planner or of an earlier run. In trial 0 the robot makes
-        a straight movement for each goal, to the target of the first movement that the first
-        solution has for this goal. If the hand misses the goal, or if that movement has no target,
-        the corrective process acts. Without a first solution, only the corrective process acts in
-        trial 0.
+        a straight movement for each goal. The target is that of the first movement of the first
+        solution for this goal (for a path, its last waypoint). If the hand misses the goal, or if
+        there is no target, the corrective process acts. By default there is no first solution, and
+        only the corrective process acts in trial 0.
 
     Returns
     -------
@@ -154,8 +154,8 @@ def learn_many(
 ) -> list[LearningRun]:
     """Run the learner once for each of many seeds, as :func:`learn` does.
 
-    The runs are made side by side and in threads. This takes less time, but does not change the
-    results of the runs.
+    The runs are made side by side and in threads. This saves time, and does not change the results
+    of the runs.
 
     Parameters
     ----------
@@ -166,9 +166,9 @@ def learn_many(
     trials : int
     model : MotionModel
     start : sequence of Movement
-        First solution (:func:`learn`). All arguments except the seed are the same for every run.
+        First solution of every run (:func:`learn`).
     jobs : int
-        Largest number of threads; -1 for one per core.
+        Largest number of threads, from 1 to 10,000; -1 stands for the number of cores.
 
     Returns
     -------
@@ -184,8 +184,8 @@ def learn_many(
 
         - :func:`learn` refuses it;
         - ``seeds`` is a string or not iterable, or has equal seeds;
-        - there are too many seeds: the rewards of all runs are stored, at most 1,000,000 runs and
-          200,000,000 trials;
+        - there are more than 1,000,000 seeds, or the runs have more than 200,000,000 trials in all
+          (the rewards of all trials are stored);
         - ``jobs`` is neither -1 nor from 1 to 10,000.
     """
     task = as_task(task)
@@ -307,7 +307,7 @@ Kernels = Literal["learner", "motion", "trials"]
 def warm_up(task: Task, *parts: Kernels) -> None:
     """Compile the kernels for a task, or load their machine code, before the first run.
 
-    The kernels are compiled for the number of links of the task's robot.
+    The machine code of the kernels depends on the number of links of the task's robot.
 
     Parameters
     ----------

@@ -46,17 +46,18 @@ class LearningRun:
     solution: tuple[Movement, ...]
     """Movements of the best trial; empty if no trial was completed."""
     replay: tuple[Movement, ...]
-    """Movements of one noiseless greedy trial with the final tables; empty if it failed."""
+    """Movements of the replay, a greedy trial without exploration that is made with the final
+    tables after all other trials; empty if it failed. Motor noise acts in the replay as well."""
     replay_reward: int | None
     """Total reward of the replay; None if it failed."""
     values: Array
     """Value table Q, shape ``(goals, 3, 2)``. The axes are goal, previous hand (left, right, none)
-    and hand. Q is the highest total reward of the completed trials with this hand in this state;
-    with ``credit="subtask"`` it is the highest return of the goal. Q is -inf where nothing was
-    learned."""
+    and hand. A state is a pair of a goal and a previous hand. Q is the highest total reward of the
+    completed trials that chose this hand in this state; with ``credit="subtask"`` it is the highest
+    return of the goal in these trials. Q is -inf where nothing was learned."""
     targets: Array
-    """q*, the stored targets, shape ``(goals, 3, 2, dof)``, in length units (base) and rad
-    (joints); NaN where Q is -inf."""
+    """Stored targets q*, shape ``(goals, 3, 2, dof)``, in length units (base) and rad (joints); NaN
+    where Q is -inf. The first three axes are those of ``values``."""
     corrections: NDArray[np.int64]
     """Number of corrective movements in trial 0 and in each tenth of the later trials, shape
     ``(11,)``."""
@@ -81,7 +82,7 @@ class LearningRun:
 
         - Without motor noise, the learned solution is the best trial, or the replay if the
           condition has ``learned="replay"``. It is empty if this trial did not hit every goal.
-        - With motor noise, the best trial is partly luck. So the learned solution is
+        - With motor noise, the reward of the best trial is partly luck. So the learned solution is
           :attr:`next_action`, which was not executed. It is empty only if no trial was completed.
         """
         if self.model.motor_noise > 0.0:
@@ -94,9 +95,10 @@ class LearningRun:
     def next_action(self) -> tuple[Movement, ...]:
         """Movements that the learner would make in a next trial without exploration.
 
-        The state at a goal is the pair of the goal and the hand for the goal before.
+        The state at a goal is the pair of this goal and the hand for the goal before.
 
-        - *Hand.* The hand for a goal is the one with the highest Q in the state.
+        - *Hand.* The hand for a goal is the one with the highest Q in the state; at a tie the left
+          hand.
         - *Target.* The target is the stored target q* of this hand. If none is stored, the movement
           is corrective and has no target. If the condition does not move the idle arm, the entries
           of this arm in the target are NaN.
@@ -122,7 +124,7 @@ class LearningRun:
 
     @property
     def reason(self) -> str:
-        """Sentence on why the run has no learned solution; empty if there is a learned solution."""
+        """Sentence on why the run has no learned solution; empty if it has one."""
         if self.learned:
             return ""
         if self.best_trial is not None:
@@ -134,7 +136,7 @@ class LearningRun:
 
     @property
     def reward(self) -> int | None:
-        """Total reward of the best trial or of the replay; None without a solution.
+        """Total reward of the best trial or of the replay; None without such a trial.
 
         It is the reward of the replay if the condition has ``learned="replay"``, and otherwise the
         highest reward of all trials. With motor noise, the reward of this single trial is partly
@@ -146,7 +148,7 @@ class LearningRun:
 
     @property
     def hands(self) -> str | None:
-        """Hand sequence of the learned solution, such as ``"LRLR"``; None without a solution."""
+        """Hand sequence of the learned solution, such as ``"LRLR"``; None if there is none."""
         return hands_in(self.learned) if self.learned else None
 
     @property

@@ -1,7 +1,7 @@
 """The dual-process learner as methods: one for each exploration condition, and a general one.
 
-Variants of the learner that use more information are separate methods. So the information that a
-method declares is right for all values of its parameters.
+Each variant of the learner that uses more information is a separate method. So the information that
+a method declares does not depend on the values of its parameters.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class DualProcessParameters(Parameters):
 
 
 class CustomParameters(DualProcessParameters):
-    """Parameters of a custom condition: one of the paper's, with some fields changed."""
+    """Parameters of a custom condition: a condition of the paper with some fields changed."""
 
     base: Literal["EC1", "EC2", "EC3", "EC4"] = "EC4"
     """The condition of the paper that is changed."""
@@ -90,12 +90,12 @@ class DualProcess(Method):
     def solve(self, session: Session) -> Result:
         """Run the learner, and return the movements of its learned solution.
 
-        The learned solution is the best trial or, if the condition has ``learned="replay"``, the
-        noiseless trial after learning. With motor noise it is the learner's next action
-        (:attr:`.LearningRun.next_action`).
+        The learned solution is the best trial or, if the condition has ``learned="replay"``, a
+        greedy trial without exploration that is made after learning. With motor noise it is the
+        learner's next action (:attr:`.LearningRun.next_action`).
 
-        Raises MethodError if the trial with the learned solution did not hit every goal, or the
-        budget has no trial left.
+        Raises MethodError if there is no learned solution (:attr:`.LearningRun.learned`) or the
+        budget has no trial left, and NotApplicableError if no initial hands are found.
         """
         (result,) = self.solve_together([session])
         if isinstance(result, MethodError):
@@ -123,6 +123,11 @@ class DualProcess(Method):
         list of Result or MethodError
             For each session, in order, the result of :meth:`solve`, or the MethodError that
             :meth:`solve` would raise.
+
+        Raises
+        ------
+        NotApplicableError
+            No initial hands are found.
         """
         parameters, condition = self.parameters, self.rules()
         tasks = [session.reveal(*self.information) for session in sessions]
@@ -169,7 +174,7 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
         title, of = f"{title}, {words}", f"{METHOD_PREFIX}{base}"
         facts = replace(facts, short=f"{base}, {words}", headline=False, ablation_of=of)
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
-    if condition.is_informed:  # to move in the null space of a hand, where paths are short
+    if condition.is_informed:  # null-space motion, towards postures on short paths
         information |= {Information.JACOBIAN, Information.REWARD_FORMULA}
         names += ["drift", "pull", "direction"]
         title = f"informed learner {base}"
@@ -234,9 +239,9 @@ class CustomDualProcess(DualProcess):
     )
 
     def rules(self) -> ExplorationCondition:
-        """Return a copy of condition ``base`` in which the parameters change fields.
+        """Return a copy of condition ``base`` with the fields that the parameters set.
 
-        A field does not change if its parameter is None. The id of the copy is, for example,
+        If a parameter is None, its field is that of ``base``. The id of the copy is, for example,
         ``EC4, changed,``.
         """
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
