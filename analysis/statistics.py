@@ -109,8 +109,8 @@ def bootstrap_test(
     Raises
     ------
     ValueError
-        ``values`` is empty or not a vector, or a number (``bound`` included) is not finite, or is
-        neither 0 nor of a size from 1e-100 to 1e100.
+        ``values`` is empty or not a vector, or a number cannot be used: ``bound`` or one of the
+        values is NaN, infinite, above 1e100 in size, or below 1e-100 in size but not 0.
 
     Examples
     --------
@@ -171,8 +171,8 @@ def exchange_test(
     Raises
     ------
     ValueError
-        A sample is empty or not a vector, or a value is not finite, or is neither 0 nor of a size
-        from 1e-100 to 1e100.
+        A sample is empty or not a vector, or one of the values is NaN, infinite, above 1e100 in
+        size, or below 1e-100 in size but not 0.
 
     Examples
     --------

@@ -368,9 +368,9 @@ class Study:
         """Return the reward of the corrective process with its best hands, and these hands.
 
         The reward is in negative ticks. In a world with noise it is minus the mean ticks of 1,000
-        executions, as for a best known reward. If the corrective process does not complete the
-        task, the reward is NaN, and the hands are the empty string. For a task with more than 4,096
-        hand sequences, the initial hands of the task are used.
+        executions, as for a best known reward. The best hands are those of :attr:`corrective_best`.
+        If the corrective process does not complete the task, the reward is NaN, and the hands are
+        the empty string.
         """
         if self.is_noisy:
             best = best_hands(self.tasks[task], self.models[task])
@@ -396,7 +396,8 @@ class Study:
 
         In a world with noise, the corrective process is executed with the noise with which the runs
         are judged. This noise depends on the number of the run, so that the reward is a mean over
-        the numbers of the runs. Raises CoarticError for a study of several worlds.
+        the numbers of the runs. It is NaN for a task with more than 4,096 hand sequences that names
+        a policy instead of its initial hands. Raises CoarticError for a study of several worlds.
         """
         if self.is_noisy:
             return {
@@ -526,8 +527,9 @@ class Study:
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
         - ``headline``: True if the method, with any setting, represents its algorithm;
-        - ``parent``: label of the method of which this row is a setting or an ablation; empty for
-          any other row, if that method has no runs, and in a study that varies parameters;
+        - ``parent``: label of the method of which this row is a setting or an ablation. It is empty
+          for any other row, for a row whose parent has no runs, and for the settings of a study
+          that varies parameters;
         - ``style``: names of the colour and the marker in figures, a tuple of two strings. Write
           ``methods["style"]``, because ``methods.style`` is an attribute of pandas.
         """

@@ -266,9 +266,9 @@ def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
     """Return whether each row is about a setting or ablation of another method of the table.
 
     The row is about the method in column ``against``, if the table has this column, otherwise about
-    the method in column ``method``. The method is a setting or an ablation of the method in its
-    column ``parent`` of :attr:`.Study.methods`. The result is a Series of booleans with the index
-    of ``frame``. All are False for a table without column ``method``.
+    the method in column ``method``. If this method is a setting or an ablation of another method,
+    column ``parent`` of :attr:`.Study.methods` names the other method. The result is a Series of
+    booleans with the index of ``frame``. All are False for a table without column ``method``.
     """
     if "method" not in frame:
         return pd.Series(False, frame.index)
@@ -287,7 +287,7 @@ def caption_of(table: Table, study: Study) -> str:
 
 
 def csv_of_worlds(frames: Mapping[str, pd.DataFrame]) -> str:
-    """Return a table of all worlds of a folder as one string of CSV (:func:`csv_of`).
+    """Return a table of all worlds of a folder as the text of one CSV file (:func:`csv_of`).
 
     ``frames`` maps each world (:attr:`.Study.worlds`) to the table in this world; at least one of
     the tables must have rows. Column ``world``, after the names of the rows, names the world of
@@ -304,9 +304,10 @@ def csv_of_worlds(frames: Mapping[str, pd.DataFrame]) -> str:
 
 
 def csv_of(frame: pd.DataFrame) -> str:
-    """Return a table as a string of CSV. Its first column, ``row``, contains the names of the rows.
+    """Return a table as the text of a CSV file.
 
-    An apostrophe is put before each string that a spreadsheet would read as a formula.
+    The first column, ``row``, contains the names of the rows. An apostrophe is put before each
+    string that a spreadsheet would read as a formula.
     """
 
     def guarded(value: Any) -> Any:
@@ -586,9 +587,9 @@ def _mean_gap_after(study: Study, trials: int) -> pd.Series:
 
 
 def _standing_rows(study: Study, *, ranked: bool) -> Rows:
-    """Yield the rows of the table of ranked methods, or of the methods that are not ranked.
+    """Yield the rows of table ``ranking`` or, if ``ranked`` is False, of table ``not-ranked``.
 
-    ``ranked`` is True for the methods that are ranked (:func:`.standings`).
+    The rows are in the order of :func:`.standings`.
     """
     rows = standings(study)
     rows = rows[(rows.why == "") == ranked]
@@ -985,7 +986,7 @@ def _are_equal(study: Study, settings: Sequence[Sequence[str]]) -> bool:
 def list_contexts(study: Study) -> Rows:
     """Yield a row for each method, pair of tasks, shared goal, and hand (:func:`.shared_goals`).
 
-    A row contains
+    A row contains, among other columns,
 
     - the posture difference between the two tasks and the lean (:func:`.lean`), for the whole
       posture, for the base alone (``_base``) and for the joints alone (``_joints``);

@@ -55,9 +55,9 @@ def number(value: float, digits: _Digits | None = None) -> str:
         Number of decimals. By default, it depends on the number:
 
         - An integer has no decimals.
-        - Any other number has the decimals that three significant figures need, none from 100 on.
-        - A number between −0.0001 and 0.0001, except 0, has two significant figures and an
-          exponent, as in ``1.2e−05``.
+        - Any other number whose size is below 0.0001 has two significant figures and an exponent,
+          as in ``1.2e−05``.
+        - All other numbers have three significant figures, or no decimals from 100 on.
 
     Returns
     -------
@@ -240,9 +240,8 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
 def ending_of(study: Study) -> str:
     """Return the suffix of ids for the world of a study, such as ``-motor-noise-0-01``.
 
-    The ids are those of tables, figures and sections of the page.
-
-    The suffix is empty for the paper's world. Raises CoarticError for a study of several worlds.
+    The ids are those of tables, figures and sections of the page. The suffix is empty for the
+    paper's world. Raises CoarticError for a study of several worlds.
     """
     return f"-{slugs([study.world])[study.world]}" if study.world else ""
 
