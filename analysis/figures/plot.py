@@ -89,9 +89,11 @@ DrawsFigure = Callable[..., Plot | None]
 """Function that draws a figure of the report.
 
 Its argument is a study of one world. It returns a :class:`Plot`, or None if the study has no runs
-for this figure. Optional arguments are ``width``, the width of the figure in inches, such as 3.4,
-5.5 or 7.2; and ``style``, settings of Matplotlib that override those of the project, in any form
-that ``matplotlib.style.use`` accepts.
+for this figure. There are two optional arguments:
+
+- ``width``: width of the figure in inches, such as 3.4, 5.5 or 7.2;
+- ``style``: settings of Matplotlib that override those of the project. It is a dict, the name of a
+  style of Matplotlib, or the path of a style file.
 """
 
 
@@ -119,9 +121,9 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
         Title of the figure.
     caption : str
         Beginning of the caption. ``{n}`` stands for the smallest and the largest number in column
-        ``runs`` of the figure's numbers, such as ``20 to 50``; it is empty if there is no such
-        column. ``{reference}`` stands for the name of the rewards from which gaps are measured
-        (:func:`.reference`).
+        ``runs`` of the figure's numbers, such as ``20 to 50``, or for one number if they are equal.
+        It is empty if there is no such column. ``{reference}`` stands for the name of the rewards
+        from which gaps are measured (:func:`.reference`).
     """
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:

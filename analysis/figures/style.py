@@ -183,7 +183,8 @@ def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any)
     handles : sequence of matplotlib.artist.Artist
         Entries of the legend: artists with labels.
     columns : int
-        Number of columns of the legend. It is reduced if the figure is too narrow for the labels.
+        Number of columns of the legend. If the figure is too narrow for the labels, there are
+        fewer columns.
     **more
         Arguments of Matplotlib's ``Figure.legend``.
     """

@@ -189,7 +189,7 @@ def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str
 
     - ``finding``: the finding as a list of lines (:func:`.finding`);
     - ``first_lines``: the number of these lines that are at the top of the page instead of in the
-      section: all lines if the ranking varies parameters, otherwise one;
+      section: all lines for the ranking of a study that varies parameters, otherwise one;
     - ``figures``: a tuple for each figure: the plot, its SVG, and the SVGs of its panels for phones
       (:func:`.panels_for_page`);
     - ``shown``: a dict for each table that has rows, with its ``id``, the name of its ``file``

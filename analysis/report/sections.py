@@ -374,7 +374,7 @@ def finding(study: Study, section: Section) -> list[str]:
     subjects = methods.apply(subject_of, axis=1)
 
     def few(row: Mapping[str, Any]) -> str:
-        """Return a remark if one of the two methods has too few runs for a test, otherwise ""."""
+        """Return a remark if a stochastic method has too few runs for a test, otherwise ""."""
         labels = str(row["method"]), str(row["against"])
         return TOO_FEW * has_few_runs(study, labels, solved_tasks(study, labels[1]))
 
