@@ -5,18 +5,20 @@ Tests:
 - :func:`exchange_test` compares two means by a permutation test, which exchanges the labels of the
   values.
 - :func:`bootstrap_test` compares a mean with a number by the studentised bootstrap (bootstrap-t).
-- :func:`share_test` compares a share with a number by the exact binomial test.
+- :func:`stratified_test` compares means over strata, such as tasks, by both of these methods.
+- :func:`share_test` compares a proportion with a number by the exact binomial test.
 - :func:`holm` adjusts the p-values of several tests.
 
-Samples and the seed of resampling are those of :mod:`coartic.estimates`. Sources: B. Efron & R. J.
-Tibshirani (1993), An Introduction to the Bootstrap, chapter 16; A. C. Davison & D. V. Hinkley
-(1997), Bootstrap Methods and their Application, chapter 4 (p-values that count the observed
-sample); S. Holm (1979), Scandinavian Journal of Statistics 6.
+A sample consists of the scores of independent runs, as in :mod:`coartic.estimates`. Resampling uses
+the seed :data:`.SEED`. Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the
+Bootstrap, chapter 16; A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their
+Application, chapter 4 (p-values that count the observed sample); S. Holm (1979), Scandinavian
+Journal of Statistics 6.
 
 Intervals:
 
 - The interval of :func:`task_mean` is for other runs on the same tasks. The bootstrap resamples
-  runs within tasks. All tasks have the same weight, whatever their number of runs.
+  runs within tasks. All tasks have the same weight, even if their numbers of runs differ.
 - The interval of :func:`other_tasks` is for other tasks of the same families. The bootstrap is
   hierarchical (Davison & Hinkley 1997, section 3.8): it resamples instances within families, and
   then runs within instances. Families are fixed and have the same weight.
@@ -73,11 +75,11 @@ def bootstrap_test(
 ) -> Estimate:
     """Test whether a mean differs from a number, by the studentised bootstrap (bootstrap-t).
 
-    The test statistic is the mean divided by its standard error, after ``bound`` is subtracted from
-    each value. For its distribution under the null hypothesis, the sample is shifted to the mean 0
-    and resampled (Efron & Tibshirani 1993, section 16.4). Unlike in the book, p = (1 + number of
-    bootstrap samples at least as extreme) / (1 + number of bootstrap samples), which is never 0
-    (Davison & Hinkley 1997).
+    The test statistic is (mean − ``bound``) / standard error. To estimate its distribution under
+    the null hypothesis, the sample is shifted to the mean ``bound`` and resampled (Efron &
+    Tibshirani 1993, section 16.4). Unlike in the book, p = (1 + number of bootstrap samples at
+    least as extreme) / (1 + number of bootstrap samples), which is never 0 (Davison & Hinkley
+    1997).
 
     Parameters
     ----------
@@ -87,7 +89,7 @@ def bootstrap_test(
         The number with which the mean is compared, in the unit of ``values``.
     alternative : {"greater", "less", "two-sided"}
         The alternative hypothesis: the mean of ``values`` is above ``bound`` (``"greater"``), below
-        it (``"less"``), or one of the two (``"two-sided"``).
+        it (``"less"``), or different from it (``"two-sided"``).
     resamples : int
         Number of bootstrap samples; by default 9,999, so that the smallest p is 0.0001.
 
@@ -101,12 +103,14 @@ def bootstrap_test(
           ``least_p``.
         - If all values are equal, ``p`` is ``least_p``, or 1 if the difference does not have the
           sign of a one-sided alternative.
-        - ``p`` is NaN with fewer than two values, and if all values are equal to ``bound``.
+        - ``p`` and ``least_p`` are NaN with fewer than two values, and if all values are equal to
+          ``bound``.
 
     Raises
     ------
     ValueError
-        ``values`` is empty or not a vector, or a number is NaN or infinite.
+        ``values`` is empty or not a vector, or a number cannot be used: ``bound`` or one of the
+        values is NaN, infinite, above 1e100 in size, or below 1e-100 in size but not 0.
 
     Examples
     --------
@@ -139,10 +143,10 @@ def exchange_test(
 ) -> Estimate:
     """Test whether two means differ, by a permutation test that exchanges the labels of values.
 
-    The test statistic is the difference of the means divided by its standard error. The standard
-    error has a separate variance for each sample, so that the test is also valid, for large
-    samples, if their spreads differ (A. Janssen 1997, Statistics & Probability Letters 36). If both
-    variances are 0, the statistic is infinite, or 0 if the means are equal.
+    The test statistic is the difference of the means divided by its standard error. The variances
+    of the two samples are estimated separately. Therefore, for large samples, the test is also
+    valid if the spreads of the samples differ (A. Janssen 1997, Statistics & Probability Letters
+    36). If both variances are 0, the statistic is infinite, or 0 if the means are equal.
 
     Parameters
     ----------
@@ -150,24 +154,25 @@ def exchange_test(
         The two samples: independent values, in the same unit.
     alternative : {"greater", "less", "two-sided"}
         The alternative hypothesis: the mean of ``first`` is above that of ``second``
-        (``"greater"``), below it (``"less"``), or one of the two (``"two-sided"``). The two-sided
-        test compares absolute values of the statistic.
+        (``"greater"``), below it (``"less"``), or different from it (``"two-sided"``). The
+        two-sided test compares absolute values of the statistic.
     resamples : int
-        Number of random permutations. If there are at most this many ways to divide the values, all
-        of them are used, and p is exact. Otherwise p = (1 + number of permutations at least as
-        extreme) / (1 + ``resamples``).
+        Number of random permutations. If there are at most this many ways to divide all values into
+        two samples of these sizes, all ways are used, and p is exact. Otherwise p = (1 + number of
+        permutations at least as extreme) / (1 + ``resamples``).
 
     Returns
     -------
     Estimate
-        ``value`` is the mean of ``first`` minus the mean of ``second``; there is no interval. ``p``
-        is NaN with fewer than five values in a sample, and if all values are equal. ``least_p`` is
-        the smallest p that the test can give (:func:`smallest_p`).
+        ``value`` is the mean of ``first`` minus the mean of ``second``; there is no interval.
+        ``least_p`` is the smallest p that the test can give (:func:`smallest_p`). ``p`` and
+        ``least_p`` are NaN with fewer than five values in a sample, and if all values are equal.
 
     Raises
     ------
     ValueError
-        A sample is empty or not a vector, or a value is NaN or infinite.
+        A sample is empty or not a vector, or one of the values is NaN, infinite, above 1e100 in
+        size, or below 1e-100 in size but not 0.
 
     Examples
     --------
@@ -186,19 +191,19 @@ def exchange_test(
 
 
 def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool = True) -> float:
-    """Return the smallest p that the permutation test of two samples can give.
-
-    The test is :func:`exchange_test`.
+    """Return the smallest p that :func:`exchange_test` can give for two samples.
 
     Parameters
     ----------
     n, m : int
         Numbers of values in the two samples, at least 2.
     resamples : int
-        Number of random permutations, which are used if there are more ways to divide the values.
+        Number of random permutations. They are used if there are more than ``resamples`` ways to
+        divide the values.
     two_tailed : bool
         True for the two-sided test. If both samples have the same size, swapping them gives a
-        statistic that is as extreme, so that the smallest exact p is twice as large.
+        statistic of the same absolute value. The smallest exact p is then twice that of a one-sided
+        test.
 
     Returns
     -------
@@ -217,17 +222,18 @@ def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool =
 
 
 def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> float:
-    """Return the two-sided p-value of a difference of means, summed over strata such as tasks.
+    """Test the sum over strata, such as tasks, of the differences between two means.
 
-    In each stratum, labels are exchanged as in :func:`exchange_test`. If a stratum compares a
-    sample with an exact number, the sample is resampled as in :func:`bootstrap_test`. The test
-    statistic is the sum of the differences over strata, divided by the square root of the sum of
-    their variances. p = (1 + number of resamples at least as extreme) / (1 + number of resamples).
+    In each stratum, the labels of the values are exchanged as in :func:`exchange_test`. If a
+    stratum compares a sample with an exact number, the sample is resampled as in
+    :func:`bootstrap_test`. The test statistic is the sum of the differences over strata, divided by
+    the square root of the sum of their variances. The test is two-sided, with 9,999 resamples: p =
+    (1 + number of resamples at least as extreme) / (1 + number of resamples).
 
     Parameters
     ----------
     strata : sequence of pairs
-        Two samples for each stratum, shapes (n,) and (m,). A float instead of a sample stands for
+        Two samples for each stratum, arrays of shapes (n,) and (m,). A float instead of an array is
         an exact number, such as the gap of a deterministic method.
 
     Returns
@@ -256,8 +262,8 @@ def _p_of(
 ) -> float:
     """Return the p-value of :func:`stratified_test` for a one-sided or two-sided alternative.
 
-    If ``exact`` is True, all ways to exchange labels are used instead of ``resamples`` random ones.
-    There must then be only one stratum, and it must have two samples.
+    If ``exact`` is True, all ways to exchange labels are used instead of ``resamples`` random
+    exchanges. There must then be only one stratum, with two samples.
     """
     if exact:
         resamples = math.comb(sum(map(np.size, strata[0])), np.size(strata[0][0]))
@@ -298,9 +304,9 @@ def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
     pool : ndarray, shape (N,)
         The values of both samples together, or of the only sample.
     rows : ndarray of int, shape (rows, k)
-        The resamples: each row contains the indices in ``pool`` of the values of one of the two
-        samples: the first sample if k = n, otherwise the second. If k = N, there is only one
-        sample, and each row draws from it with replacement.
+        A row for each resample. It contains the indices in ``pool`` of the values of one of the two
+        samples: of the first sample if k = n, otherwise of the second sample. If k = N, there is
+        only one sample, and the row contains indices that were drawn with replacement.
     n : int
         Number of values of the first sample.
 
@@ -332,9 +338,10 @@ def _studentised(moments: Array, size: float) -> Array:
     """Return differences divided by the square roots of their variances, shape ``(rows,)``.
 
     ``moments``, shape ``(2, rows)``, contains the differences in the first row and the variances in
-    the second row. ``size`` is a bound on the absolute values of the sample. A difference or a
-    variance is replaced by 0 if it is so small, relative to ``size``, that it can be due to
-    rounding. The result is 0 if the difference is 0, and infinite if only the variance is 0.
+    the second row. ``size`` is a bound on the absolute values from which they were computed. A
+    difference or a variance is replaced by 0 if it is so small, relative to ``size``, that it can
+    be due to rounding (:data:`.NEGLIGIBLE`). The result is 0 if the difference is 0, and infinite
+    if only the variance is 0.
     """
     differences = np.where(np.abs(moments[0]) < NEGLIGIBLE * size, 0.0, moments[0])
     variances = np.where(moments[1] < (NEGLIGIBLE * size) ** 2, 0.0, moments[1])
@@ -356,10 +363,10 @@ def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
 
 
 def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.int32]:
-    """Draw random subsets of the indices 0 to ``runs`` - 1.
+    """Draw ``size`` random subsets of the indices 0 to ``runs`` - 1.
 
-    Each of the ``size`` rows contains ``chosen`` indices, drawn without replacement. The result has
-    shape ``(size, chosen)``.
+    The result has shape ``(size, chosen)``. Each row contains ``chosen`` indices, drawn without
+    replacement.
     """
     order = rng.random((size, runs)).argpartition(chosen - 1, axis=1)
     return order[:, :chosen].astype(np.int32)  # a view would hold all of order in memory
@@ -370,14 +377,13 @@ def places(
 ) -> Iterator[tuple[slice, NDArray[np.int32]]]:
     """Yield the indices of resamples in chunks that fit into the processor's cache.
 
-    Each chunk is a pair: the slice of the resamples that it contains, and an array of shape
-    ``(resamples in the chunk, chosen)``. Each row of the array is a resample: ``chosen`` of the
-    indices 0 to ``runs`` - 1.
+    Each chunk is a pair: a slice of ``range(resamples)``, and an array with a row for each resample
+    in this slice. The row contains ``chosen`` of the indices 0 to ``runs`` - 1.
 
     - If ``exact`` is True, the rows are all combinations of ``chosen`` indices, and ``resamples``
       must be the number of combinations.
     - Otherwise the indices are drawn at random: with replacement if ``chosen`` equals ``runs``, and
-      without replacement if it is smaller.
+      without replacement if ``chosen`` is smaller.
     """
     choices = combinations(range(runs), chosen)
     for part in slices(resamples, max(1, IN_CACHE // runs)):
@@ -396,7 +402,7 @@ def _kept_places(
 ) -> list[tuple[slice, NDArray[np.int32]]]:
     """Return the chunks of :func:`places` as a list, drawn by a new generator with :data:`.SEED`.
 
-    The list is cached for other samples of the same size: do not change it.
+    The list is cached: do not change it.
     """
     return [*places(runs, chosen, resamples, exact, np.random.default_rng(SEED))]
 
@@ -413,17 +419,18 @@ def share_test(count: _Count, total: _Count, share: _Share, alternative: Alterna
     share : float
         The share with which ``count / total`` is compared, from 0 to 1.
     alternative : {"greater", "less", "two-sided"}
-        The alternative hypothesis: the proportion is above ``share``, below it, or one of the two.
+        The alternative hypothesis: the proportion is above ``share``, below it, or different from
+        it.
 
     Returns
     -------
     Estimate
-        ``value`` is ``count / total - share``; there is no interval.
+        ``value`` is ``count / total - share``, and ``p`` is exact; there is no interval.
 
     Raises
     ------
     ValueError
-        ``count`` exceeds ``total``, or ``total`` is 0.
+        ``count`` is not from 0 to ``total``, ``total`` is below 1, or ``share`` is not from 0 to 1.
 
     Examples
     --------
@@ -437,16 +444,16 @@ def share_test(count: _Count, total: _Count, share: _Share, alternative: Alterna
 def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
     """Return the Holm-adjusted p-values of a family of tests, in the order of the tests.
 
-    If each hypothesis with an adjusted p-value of at most α is rejected, the family-wise error rate
-    is at most α. The tests may depend on each other.
+    If each null hypothesis with an adjusted p-value of at most α is rejected, the family-wise error
+    rate is at most α. The tests may depend on each other.
 
     Parameters
     ----------
     p_values : array_like
         A p-value from 0 to 1 for each test, or NaN for a test that could not be made.
     family : int, optional
-        Number of planned tests. If it is given, tests without a p-value are treated as tests with p
-        = 1. By default, they are left out.
+        Number of planned tests. If it is passed, planned tests without a p-value are treated as
+        tests with p = 1. By default, tests without a p-value are left out.
 
     Returns
     -------
@@ -456,7 +463,7 @@ def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
     Raises
     ------
     ValueError
-        A number is neither NaN nor from 0 to 1, or there are more p-values than ``family``.
+        A number is neither NaN nor from 0 to 1, or more than ``family`` numbers are not NaN.
 
     Examples
     --------
@@ -484,20 +491,20 @@ this instance, shape ``(runs,)``."""
 
 
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
-    """Return the mean over tasks and runs, with its interval for other runs.
+    """Return the mean over tasks of the mean over runs, with its interval for other runs.
 
-    All tasks have the same weight: for each task, the mean over runs is computed first, and then
-    the mean of these means over tasks.
+    All tasks have the same weight.
 
     Parameters
     ----------
     values : iterable of array_like, shape (runs,)
-        A score of each run on each task.
+        For each task, the scores of the runs on the task.
 
     Returns
     -------
     Estimate
         The mean and the ends of its interval (:func:`.mean_of_means`), in the unit of the scores.
+        The ends are NaN if a task has fewer than five runs.
 
     Raises
     ------
@@ -514,8 +521,8 @@ def other_tasks(scores: Scores) -> Estimate:
     Parameters
     ----------
     scores : mapping of str to sequence of arrays, shape (runs,)
-        Maps each family to a list of its instances (random tasks). The entry for an instance is an
-        array with a score of each run.
+        Maps each family to a list with an array for each of its instances (random tasks): the
+        scores of the runs on this instance.
 
     Returns
     -------
@@ -528,7 +535,8 @@ def other_tasks(scores: Scores) -> Estimate:
     Raises
     ------
     ValueError
-        There is no family, a family has no instances, or an instance has no runs.
+        There is no family, a family has no instances, an instance has no runs, or a score is NaN or
+        infinite.
 
     Examples
     --------
@@ -539,12 +547,12 @@ def other_tasks(scores: Scores) -> Estimate:
 
     Notes
     -----
-    The interval is a percentile interval of bootstrap samples. In a family with k instances, the
-    deviations of bootstrap means from the mean are multiplied by √(k / (k − 1)), because the
-    bootstrap underestimates the standard deviation of a mean by this factor. If there are few runs
-    that vary much, the interval is a little too wide, because the means of instances already
-    contain the variation over runs. The interval never extends beyond the lowest and the highest
-    score of a run, each averaged over families.
+    The interval is the percentile interval of 1,999 bootstrap samples. In a family with k
+    instances, the deviations of bootstrap means from the mean are multiplied by √(k / (k − 1)),
+    because the bootstrap underestimates the standard deviation of a mean by this factor. If there
+    are few runs that vary much, the interval is a little too wide, because the means of instances
+    already contain the variation over runs. The interval is cut off at two limits: the mean over
+    families of the lowest score of a run, and the mean over families of the highest score of a run.
     """
     if not scores or not all(scores.values()):
         sizes = {family: len(instances) for family, instances in scores.items()}

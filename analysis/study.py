@@ -1,7 +1,7 @@
 """Load a results folder as a study: its runs, methods, cells, tasks, movements and optima.
 
-``load("results/comparison")`` reads a folder and returns a :class:`Study`. The functions of the
-other modules of the analysis take this study as their argument.
+``load("results/comparison")`` reads a folder and returns a :class:`Study`. The tables, the figures
+and many other functions of the analysis take this study as an argument.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
 
 CellKey = tuple[str, str]
-"""Name of a task, and label of a method: its id with its setting, such as ``cma-es/bandit
-sigma=0.1``."""
+"""Pair of the name of a task and the label of a method. A label is the id of the method with its
+setting, such as ``cma-es/bandit sigma=0.1``."""
 
 
 UNITS = {
@@ -63,8 +63,8 @@ UNITS = {
     "other_arm_travel": "rad",
     "process_peak_mb": "MiB",
 }
-"""Maps columns of :attr:`Study.runs` to their units. The frame also has this dict in
-``attrs["units"]``."""
+"""Maps names of columns of :attr:`Study.runs` to units. Rewards are negative numbers of ticks. The
+frame contains this dict in ``attrs["units"]``."""
 
 
 def _labelled(stored: pd.DataFrame) -> pd.DataFrame:
@@ -83,21 +83,21 @@ def solved(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def typical_run(runs: pd.DataFrame) -> str:
-    """Return the id of the run whose value is nearest to the median.
+    """Return the id of the run whose value (column ``value``) is nearest to the median of all runs.
 
-    If several runs are equally near, it is the first of them. All runs must have a solution (status
-    ``ok``), and there must be at least one run.
+    If several runs are equally near, the first of them is used. All runs must have a solution
+    (status ``ok``), and there must be at least one run.
     """
     values = runs.value.to_numpy(dtype=np.float64)
     return str(runs.run_id.iloc[np.abs(values - np.median(values)).argmin()])
 
 
 Part = Literal["solution", "replay"]
-"""Part of a run whose movements can be executed: its solution, or its replay (the trial without
-noise after learning)."""
+"""Part of a run: its solution, or its replay, which is a trial of a learner after learning, without
+exploration noise."""
 MAX_EXECUTED = 500
-"""Largest number of runs of a method on a task that are executed again and have signatures: the
-first solved runs."""
+"""Largest number of runs of a method on a task that are executed again and have signatures. These
+are the first solved runs, in the order of their numbers."""
 
 
 def check_study(study: object) -> None:
@@ -129,8 +129,8 @@ def load(folder: str | Path, *, against: str = "") -> Study:
     Raises
     ------
     CoarticError
-        The folder is not a results folder, runs of its suite are missing, or ``against`` does not
-        name exactly one method.
+        The folder is not a results folder, the folder cannot be read, runs of its suite are
+        missing, or ``against`` does not name exactly one method.
 
     Examples
     --------
@@ -155,8 +155,9 @@ def _label_in(study: Study, name: str) -> str:
     """Return the label of the method to which a user's name refers.
 
     The name is looked up first among the labels of the study's methods, then among their ids, and
-    then among their titles. An id of the learner can be shortened to its condition, such as
-    ``EC4``. Raises CoarticError if the name refers to no method, or to more than one.
+    then among their titles. For the learner, ``dual-process/`` at the beginning of an id or a label
+    can be left out, as in ``EC4``. Raises CoarticError if the name refers to no row of
+    :attr:`Study.methods`, or to more than one.
     """
     methods = study.methods
     for names in (methods.index, methods.method_id, methods.title):
@@ -176,33 +177,35 @@ class Study:
     """The stored results of a folder.
 
     If the folder contains runs in several worlds, :attr:`worlds` contains a study for each world.
-    Attributes and functions that compare runs (best known rewards, cells, executed runs, tables and
-    figures) need a study of one world, and otherwise raise CoarticError.
+    Attributes and functions that compare runs need a study of one world, and otherwise raise
+    CoarticError. They are the best known rewards, the cells, executed runs, tables and figures.
     """
 
     folder: Path
     plan: Sequence[Job]
-    """The jobs of the suite: each has a cell (a task, and a method with its setting), the seed, and
-    the numbers of the runs."""
+    """The jobs that the last ``coartic run`` asked for. A job consists of a cell (a task, and a
+    method with its setting, in a world), the seed of the suite, and the numbers of the runs."""
     made_with: dict[str, Any]
-    """Versions, platform, commit, command and date of the last ``coartic run``."""
+    """Versions, platform, commit, command and date of the last ``coartic run``, by name."""
     stored: pd.DataFrame
-    """Runs as they are stored, a row for each run. :attr:`runs` has further columns."""
+    """Runs as they are stored, a row for each run, in the order of the plan. :attr:`runs` has
+    further columns."""
     marks: dict[str, list[str]] = field(default_factory=dict)
-    """Maps the id of a method to warnings about it: sentences about runs that do not reproduce, and
-    about other versions of packages."""
+    """Maps the id of a method to warnings about it. A warning is a sentence which says that a run
+    gave another result when it was made again, or that runs were made with other versions of
+    packages. Methods without warnings are left out."""
     against: str = ""
-    """Label of the method with which table ``differences`` compares the others; empty if the user
-    has named none."""
+    """Label of the method with which table ``differences`` compares the others. It is empty if the
+    user has named no method, or if the method has no runs in the world of this study."""
     imports: dict[str, list[str]] = field(default_factory=dict)
-    """Maps the id of a method from a file to the names and versions of the packages that the file
-    imports."""
+    """Maps the id of a method from a file to the packages that the file imports, as strings such as
+    ``numpy 2.1.0``."""
     elsewhere: pd.DataFrame = field(default_factory=pd.DataFrame)
     """Rows like those of :attr:`methods`, for methods that have runs only in other worlds of the
-    folder. The ranking lists these methods as not ranked."""
+    folder. Table ``not-ranked`` lists them, except searches for the optimum."""
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields of the study for pickle, without the values computed from them."""
+        """Return a dict of the fields of the study for pickle, without cached values."""
         return {stored.name: getattr(self, stored.name) for stored in fields(self)}
 
     @property
@@ -216,8 +219,8 @@ class Study:
 
         A key names the constants in which the world differs from the paper's world, such as
         ``motor_noise=0.01``. The key of the paper's world is the empty string. The paper's world
-        comes first, and the others follow in the order of the suite. For a study of one world, the
-        only value is the study itself.
+        comes first, if the folder has it, and the others follow in the order of the suite. For a
+        study of one world, the only value is the study itself.
         """
         names = sorted({job.cell.world: None for job in self.plan}, key=bool)  # the paper's first
         if len(names) == 1:
@@ -260,25 +263,28 @@ class Study:
 
     @cached_property
     def models(self) -> dict[str, MotionModel]:
-        """A dict that maps each task's name to the motion model of the world.
+        """A dict that maps the name of each task to the motion model of the world.
 
-        Models of tasks differ in tolerances that depend on the radius of the goals. Raises
-        CoarticError for a study of several worlds.
+        The models of two tasks can differ only in their tolerances, which can depend on the radius
+        of the goals. Raises CoarticError for a study of several worlds.
         """
         _ = self.world
         return {job.cell.task.name: job.cell.model for job in self.plan}
 
     @cached_property
     def is_noisy(self) -> bool:
-        """True if the study's world has motor noise."""
+        """True if the study's world has motor noise.
+
+        Raises CoarticError for a study of several worlds.
+        """
         return any(model.motor_noise > 0.0 for model in self.models.values())
 
     @property
     def folder_in_commands(self) -> str:
         """Path of the results folder, quoted for a shell, for commands that the report shows.
 
-        The path is relative to the working folder. If the results folder is not below the working
-        folder, it is only the name of the folder.
+        The path is relative to the working folder. If the results folder is not inside the working
+        folder, the result is only the name of the results folder.
         """
         path = Path(os.path.abspath(self.folder))  # without ..
         return quote(str(path.relative_to(Path.cwd()) if Path.cwd() in path.parents else path.name))
@@ -303,7 +309,7 @@ class Study:
 
     @cached_property
     def tasks(self) -> dict[str, Task]:
-        """A dict that maps the name of each task to the task.
+        """A dict that maps the name of each task to the task, in the order of the plan.
 
         Titles are changed where necessary, so that no two tasks have the same title
         (:func:`.titled_apart`).
@@ -318,13 +324,14 @@ class Study:
 
     @cached_property
     def optima(self) -> dict[str, BestKnown]:
-        """A dict that maps each task's name to its best known reward.
+        """A dict that maps the name of each task to its best known reward in the study's world.
 
         Each value is a :class:`.BestKnown`: the reward with its bound and its source. Tasks without
         a best known reward are left out (:func:`.best_known`). If the corrective process with its
         best hands gets a higher reward than the best known reward, the reward of the corrective
         process is used instead. In a world with noise, a reward is minus the mean ticks of 1,000
-        executions, whose noise differs from the noise by which runs are judged.
+        executions. Their noise differs from the noise with which runs are judged. Raises
+        CoarticError for a study of several worlds.
         """
         fresh = self._executed_afresh if self.is_noisy else None
         runs, tasks = self.stored, self.tasks.values()
@@ -338,17 +345,20 @@ class Study:
         return rewards
 
     def _executed_afresh(self, task: str, run_ids: Sequence[str]) -> list[float]:
-        """Return minus the mean ticks of 1,000 noisy executions of each run in ``run_ids``."""
+        """Return minus the mean ticks of 1,000 executions with motor noise, for each run.
+
+        The solutions of the runs in ``run_ids`` are executed (:meth:`_reference_values`).
+        """
         with open_results(self.folder) as store:
             answers = [store.run(run_id).part("solution") for run_id in run_ids]
         return self._reference_values(task, answers)
 
     def _reference_values(self, task: str, answers: Sequence[Sequence[Movement]]) -> list[float]:
-        """Return minus the mean ticks of 1,000 executions of each answer.
+        """Return minus the mean ticks of 1,000 executions with motor noise, for each answer.
 
-        An answer is a sequence of movements. The executions use the noise seed of references
-        (:func:`.reference_seed`), which differs from the seeds by which runs are judged
-        (:func:`.judge`).
+        An answer is a sequence of movements that a method recommends. The seed of the noise is
+        :func:`.reference_seed`, which differs from the seeds with which runs are judged
+        (:func:`.judge_seed`). A failed execution is counted as in :func:`.judge`.
         """
         seeds = [reference_seed(self.plan[0].seed, task)] * len(answers)
         means, _ = judge(self.tasks[task], answers, self.models[task], seeds, FRESH_EXECUTIONS)
@@ -358,8 +368,9 @@ class Study:
         """Return the reward of the corrective process with its best hands, and these hands.
 
         The reward is in negative ticks. In a world with noise it is minus the mean ticks of 1,000
-        executions, as for a best known reward. It is NaN if the corrective process does not
-        complete the task; the hands are then the empty string.
+        executions, as for a best known reward. The best hands are those of :attr:`corrective_best`.
+        If the corrective process does not complete the task, the reward is NaN, and the hands are
+        the empty string.
         """
         if self.is_noisy:
             best = best_hands(self.tasks[task], self.models[task])
@@ -376,16 +387,17 @@ class Study:
 
     @cached_property
     def corrective_best(self) -> dict[str, float]:
-        """A dict that maps each task's name to the reward of the corrective process.
+        """A dict that maps the name of each task to the reward of the corrective process alone.
 
-        The corrective process acts alone with its best hands. Shares of the possible gain, and
-        reward targets, are measured from this reward, which is in negative ticks. For a task with
-        more than 4,096 hand sequences, it is the reward with the task's initial hands. It is NaN if
-        the corrective process does not complete the task with any of these hands.
+        The reward is in negative ticks. It is the reward with the best of all hand sequences or,
+        for a task with more than 4,096 hand sequences, with the initial hands of the task. It is
+        NaN if the corrective process does not complete the task with any of these hands. Shares of
+        the possible gain, and reward targets, are measured from this reward.
 
-        In a world with noise, the corrective process is executed with the same noise by which the
-        runs are judged. As this noise depends on the number of the run, the reward is a mean over
-        the numbers of runs.
+        In a world with noise, the corrective process is executed with the noise with which the runs
+        are judged. This noise depends on the number of the run, so that the reward is a mean over
+        the numbers of the runs. It is NaN for a task with more than 4,096 hand sequences that names
+        a policy instead of its initial hands. Raises CoarticError for a study of several worlds.
         """
         if self.is_noisy:
             return {
@@ -402,11 +414,11 @@ class Study:
 
     @cached_property
     def _corrective_by_number(self) -> dict[str, dict[int, float]]:
-        """Values of the corrective process in a noisy world, by task and run number.
+        """A dict of values of the corrective process alone in a world with noise.
 
-        The keys are names of tasks; each value is a dict that maps numbers of runs to values. The
-        value for a number is minus the mean ticks of the corrective process with its best hands,
-        executed with the noise by which runs of this number are judged. It is NaN if the corrective
+        The dict maps the name of each task to a dict that maps numbers of runs to values. The value
+        for a number is minus the mean ticks of the corrective process with its best hands, executed
+        with the noise with which runs of this number are judged. The value is NaN if the corrective
         process does not complete the task.
         """
         by_task = {}
@@ -428,24 +440,26 @@ class Study:
 
         Further columns:
 
-        - ``value``: the number that rankings compare: the reward, or in a world with noise minus
-          ``mean_ticks`` (:func:`.run_values`);
+        - ``value``: the number that rankings compare, in negative ticks: the reward, or in a world
+          with noise minus ``mean_ticks`` (:func:`.run_values`); NaN for a failed run;
         - ``motor_noise``, ``norm`` and ``base_weight``: constants of the run's world;
-        - ``label``: label of the method: its id with its setting;
+        - ``label``: label of the method, that is, its id with its setting;
         - ``ranked_as``: name of the row of the ranking to which the run belongs. It differs from
           ``label`` if two conditions of the learner, for one arm and for two arms, share a row;
         - ``budget``: the number of trials that was asked for; missing for a method that does not
-          use the reward of each trial;
+          use the reward of each trial or has no parameter ``trials``;
         - ``note``: warnings about the method (:attr:`marks`); empty if there are none;
-        - ``family`` and ``split`` of the task, the number of ``goals`` of the task, and ``arms``,
-          the number of arms of which the task uses the hands (1 or 2);
-        - ``best_known``: best known reward of the task in the run's world; missing if no reward is
-          known, and for a run of a search that locks other base coordinates than the task does;
-        - ``corrective_best``: as in :attr:`corrective_best`. In a world with noise, it is the value
-          of the corrective process executed with the same noise by which the run is judged;
+        - ``family`` and ``split`` of the task, the number of its ``goals``, and ``arms``, the
+          number of its hands (1 or 2);
+        - ``best_known``: best known reward of the task in the run's world (:attr:`optima`); missing
+          if there is none, and for a search that locks other base coordinates than the task does;
+        - ``corrective_best``: the entry of the task in :attr:`corrective_best`. In a world with
+          noise, it is the value of the corrective process executed with the noise with which the
+          run is judged;
         - ``gap``: the difference between the best known reward and the value, divided by the size
-          of the best known reward (:func:`.relative_gaps`). In noise it can be negative by chance;
-        - a column for each parameter of methods, except parameters with the name of another column.
+          of the best known reward (:func:`.relative_gap`), a fraction; NaN if one of the two is
+          missing. In a world with noise it can be negative by chance;
+        - a column for each parameter of methods, unless another column has the same name.
           Therefore column ``trials`` is the number of trials that the run made, and column
           ``hands`` contains the hands of the solution.
         """
@@ -492,9 +506,10 @@ class Study:
     def methods(self) -> pd.DataFrame:
         """A row for each setting of each method, in the order of lists and figures.
 
-        The frame is indexed by label. If two conditions of the learner share a row of the ranking,
-        such as EC1 on tasks for one arm and EC4 on tasks for two arms, there is a further row for
-        both together, which copies most columns of the second condition. Columns:
+        The frame is indexed by label: the id of the method with its setting. If two conditions of
+        the learner share a row of the ranking, such as EC1 on tasks for one arm and EC4 on tasks
+        for two arms, there is a further row for both together, which copies most columns of the
+        second condition. Columns:
 
         - ``method_id``: id of the method without a setting;
         - ``condition``: id of the learner's exploration condition, such as ``EC4`` (informed
@@ -512,8 +527,9 @@ class Study:
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
         - ``headline``: True if the method, with any setting, represents its algorithm;
-        - ``parent``: label of the method of which this row is a setting or an ablation, and below
-          which lists show it; empty for any other row;
+        - ``parent``: label of the method of which this row is a setting or an ablation. It is empty
+          for any other row, for a row whose parent has no runs, and for the settings of a study
+          that varies parameters;
         - ``style``: names of the colour and the marker in figures, a tuple of two strings. Write
           ``methods["style"]``, because ``methods.style`` is an attribute of pandas.
         """
@@ -554,13 +570,13 @@ class Study:
             - ``reward``: negative ticks, missing if the trial failed;
             - ``reason``: why the trial failed, otherwise empty.
 
-            The frame has no rows if the task has more than 4,096 hand sequences. It is cached: do
-            not change it.
+            Hand sequences whose trials failed come last. The frame has no rows if the task has more
+            than 4,096 hand sequences. It is cached: do not change it.
 
         Raises
         ------
         CoarticError
-            The study has no task of this name.
+            The study has no task of this name, or has several worlds.
         """
         if task not in self.tasks:
             raise CoarticError(f"{self.folder}: {unknown('task', task, self.tasks)}")
@@ -577,9 +593,9 @@ class Study:
 
     @cached_property
     def solutions(self) -> pd.DataFrame:
-        """The stored solutions of all runs, with a row for each movement.
+        """The stored solutions of all solved runs, with a row for each movement.
 
-        Columns: ``run_id``, ``order``, ``goal``, ``hand``, ``kind``, ``ticks``, ``path``
+        The columns are ``run_id``, ``order``, ``goal``, ``hand``, ``kind``, ``ticks`` and ``path``
         (docs/results.md).
         """
         with open_results(self.folder) as store:
@@ -587,14 +603,14 @@ class Study:
         return solutions[solutions.run_id.isin(self.stored.run_id)].reset_index(drop=True)
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the rewards of the trials of each run for which they are stored.
+        """Yield the rewards of the trials of each run whose rewards are stored.
 
         Yields
         ------
         (str, ndarray)
             Id of the run, and rewards of the trials of the run in negative ticks, shape
-            ``(trials,)``. An entry is NaN if the trial failed, or if the reward of the trial is not
-            stored.
+            ``(trials,)``. An entry is NaN if the trial failed, or if the reward of this trial is
+            not stored.
         """
         ids = {*self.stored.run_id}
         with open_results(self.folder) as store:
@@ -603,22 +619,22 @@ class Study:
                     yield run_id, rewards
 
     def executed(self, task: str, method: str, *, replay: bool = False) -> Solutions:
-        """Execute the solved runs of a method on a task again.
+        """Execute the solved runs of a method on a task again, without motor noise.
 
-        The runs are executed in the study's world, but without motor noise. In a world with noise,
-        a run stores movements without ticks; where such a movement misses its goal, the corrective
-        process goes on.
+        All other constants of the model are those of the study's world. In a world with noise, a
+        run stores movements without ticks. If such a movement misses its goal, the corrective
+        process makes a further movement.
 
         Parameters
         ----------
         task : str
             Name of the task.
         method : str
-            Label of the method: its id with its setting, such as ``"random-search sigma=0.1"``. An
-            id of the learner can be shortened to its condition, such as ``"EC4"``.
+            Label of the method: its id with its setting, such as ``"random-search sigma=0.1"``.
+            For the learner, ``dual-process/`` can be left out, as in ``"EC4"``.
         replay : bool
-            True to execute the replay, a trial without noise after learning, instead of the
-            solution.
+            True to execute the replay instead of the solution. The replay is a trial of a learner
+            after learning, without exploration noise.
 
         Returns
         -------
@@ -629,8 +645,9 @@ class Study:
         Raises
         ------
         CoarticError
-            The folder has no runs of the method on the task, the stored movements cannot be
-            executed, or their ticks differ from the stored ticks.
+            The study has no runs of the method on the task or has several worlds, the stored
+            movements cannot be executed, or (in a world without noise) their ticks differ from the
+            stored ticks.
         """
         condition = f"{METHOD_PREFIX}{method}"  # conditions of the learner can be short: EC4
         if (task, method) not in self.cells and (task, condition) in self.cells:
@@ -666,15 +683,15 @@ class Study:
         return solved_runs
 
     def configurations(self, task: str, method: str, *, replay: bool = False) -> Array:
-        """Return the postures in which a method's solved runs hit the goals of a task.
+        """Return the configurations in which a method's solved runs hit the goals of a task.
 
         Parameters
         ----------
         task, method : str
             Name of the task, and label of the method (:meth:`executed`).
         replay : bool
-            True to use the trial without noise after learning instead of the solution. Runs without
-            such a trial are left out.
+            True to use the replay instead of the solution (:meth:`executed`). Runs without a replay
+            are left out.
 
         Returns
         -------
@@ -684,7 +701,8 @@ class Study:
         Raises
         ------
         CoarticError
-            The folder has no runs of the method on the task, or the runs cannot be executed again.
+            The study has no runs of the method on the task, or its runs cannot be executed again
+            (:meth:`executed`).
         """
         return self.executed(task, method, replay=replay).configurations
 
@@ -703,22 +721,24 @@ class Study:
         name : str
             Name of the signature: a key of ``coartic.analysis.SIGNATURES``, such as ``"first"``.
         task, method : str, optional
-            Name of a task, and label of a method. The signature of all runs is returned unless both
-            are passed.
+            Name of a task, and label of a method (:meth:`executed`). If both are passed, only the
+            runs of this method on this task are used, otherwise all runs.
         replay : bool
-            True to use the trial without noise after learning instead of the solution.
+            True to use the replay instead of the solution (:meth:`executed`).
 
         Returns
         -------
         Series
-            Values in the unit of the signature, with the index of :attr:`runs`. A value is NaN if
-            the signature is not defined for the run, for a failed run, and for all solved runs of a
-            method on a task after the first 500.
+            Values in the unit of the signature. The index is that of :attr:`runs`, or of the runs
+            of the method on the task. A value is NaN if the signature is not defined for the run,
+            for a failed run, for a run without a replay if ``replay`` is True, and for all solved
+            runs of a method on a task after the first 500.
 
         Raises
         ------
         CoarticError
-            The name is unknown, or the folder has no runs of the method on the task.
+            No signature has this name, the study has no runs of the method on the task, or runs
+            cannot be executed again (:meth:`executed`).
         """
         if name not in SIGNATURES:
             raise CoarticError(unknown("signature", name, SIGNATURES))
@@ -738,10 +758,11 @@ class Study:
         return values_of_all.reindex(self.runs.index)
 
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
-        """Return a dict that maps ids of runs to the movements of solutions or replays.
+        """Return a dict that maps ids of runs to the stored movements of solutions or replays.
 
         ``part`` is ``"solution"`` or ``"replay"``. Only the first 500 solved runs of each method on
-        each task are included. For ``"replay"``, runs without a replay are left out.
+        each task are included. For ``"replay"``, runs without a replay are left out. The dict is
+        cached: do not change it.
         """
         if part not in self._movements:
             ids = {*self.stored.run_id}
@@ -768,11 +789,11 @@ class Study:
 
     @cached_property
     def individual_tasks(self) -> dict[str, Task]:
-        """A dict that maps names to tasks: the tasks that a report shows individually.
+        """A dict that maps names to tasks, for the tasks that a report shows individually.
 
-        These are all tasks of the study. If more than eight of them are instances of families
-        (random tasks), all instances are left out. A changed instance, such as
-        ``two-armed/v1/i017.radius-0.2``, is treated as an instance.
+        The dict contains all tasks of the study, with one exception: if more than eight of them are
+        instances of families (random tasks), all instances are left out. A changed instance, such
+        as ``two-armed/v1/i017.radius-0.2``, is treated as an instance.
         """
         drawn = {name for name in self.tasks if address_of(name.partition(".")[0]) is not None}
         left_out = drawn if len(drawn) > 8 else ()

@@ -3,12 +3,13 @@
 :data:`TABLES` maps the id of each table to the table. The decorator :func:`table` makes a table
 from a caption, a string that describes its columns, and a function that yields its rows:
 
-- The string contains a line for each column, with the name of the column, its heading, its number
-  of decimals, and ``tex`` if LaTeX includes the column.
+- The string contains a line for each column, or for a group of columns whose names have the same
+  prefix. The line has the name of the column, its heading, its number of decimals, and ``tex`` if
+  LaTeX includes the column.
 - The function yields a pair for each row: the name of the row, and a dict that maps names of
   columns to values.
-- At least one row must have an entry (which may be NaN) for each column, and each entry of a row
-  must belong to a column.
+- For each column, at least one row must have an entry, which may be NaN. Each entry of a row must
+  belong to a column. A table may have no rows.
 """
 
 from __future__ import annotations
@@ -107,8 +108,8 @@ from coartic.runs.plan import world_title
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
-"""Iterator over the rows of a table: pairs of the name of a row, and a dict that maps names of
-columns to values."""
+"""Iterator over the rows of a table. Each item is a pair: the name of the row, and a dict that maps
+names of columns to values."""
 SHORT_ID = 8
 """Number of characters of a run's id that tables show; commands accept such a prefix."""
 _FORMULA = ("=", "+", "-", "@")
@@ -120,8 +121,8 @@ class Column(NamedTuple):
     """A column of a table, with heading and format."""
 
     name: str
-    """Name of the column in the CSV file, or the common prefix of the names of several columns if
-    ``ending`` has ``*``."""
+    """Name of the column in the CSV file. If ``ending`` contains ``*``, it is the common prefix of
+    the names of several columns."""
     ending: str = ""
     """Which columns of the CSV file belong to this column:
 
@@ -133,17 +134,17 @@ class Column(NamedTuple):
     """
     heading: str = ""
     """Heading on the page and in LaTeX. ``{}`` stands for the part of the column's name after the
-    prefix, such as the name of a task. If the heading contains ``(%)``, fractions are multiplied by
-    100. If the heading is empty, only the CSV file has the column."""
+    prefix; the name of a task or family is replaced by its title. If the heading contains ``(%)``,
+    the values are multiplied by 100. If the heading is empty, only the CSV file has the column."""
     digits: str = ""
     """Number of decimals, or ``p`` for a p-value. If it is empty, :func:`.number` chooses the
     number of decimals."""
     in_latex: bool = False
-    """True if LaTeX also has the column."""
+    """True if LaTeX also has the column, which must then have a heading."""
 
 
 def _column_of(line: str) -> Column:
-    """Return the column that a line of a table's definition describes.
+    """Parse a line of a table's definition, which describes a column.
 
     A line, such as ``gap[] | gap (%) | 1 | tex``, has up to four parts: the name of the column with
     its ending (:class:`Column`), the heading, the number of decimals, and ``tex`` if LaTeX includes
@@ -160,25 +161,27 @@ class Table:
 
     id: str
     caption: str
-    """Caption. ``{tasks}`` stands for the number of ranked tasks, and ``{reference}`` for the name
-    of the rewards from which gaps are measured (:func:`.reference`)."""
+    """Caption. ``{tasks}`` stands for the number of ranked tasks, such as ``4 tasks``.
+    ``{reference}`` stands for the name of the rewards from which gaps are measured
+    (:func:`.reference`), such as ``best known reward``."""
     columns: tuple[Column, ...]
-    """Columns of the CSV file, in order. The last is ``run_ids``: the ids of the runs from which
-    each row is computed."""
+    """Columns of the CSV file, in order. The last column is ``run_ids``: the ids of the runs from
+    which each row is computed."""
     rows: Callable[[Study], Rows]
     """Function of a study that yields the rows, each as a pair: the name of the row, and a dict
     that maps names of columns to values."""
     with_settings: bool = False
-    """True if page and LaTeX also show rows of settings and ablations of other methods in the
-    table."""
+    """True if page and LaTeX also show the settings and ablations of other methods in the table
+    (:func:`is_setting`). The CSV file always has these rows."""
 
     def __call__(self, study: Study) -> pd.DataFrame:
         """Return the table of a study as a frame, indexed by row names.
 
         The ends of intervals are in columns whose names end in ``_low`` and ``_high``, and standard
-        deviations in columns whose names end in ``_sd``. Column ``note`` contains the warnings
-        about methods (:attr:`.Study.marks`); the title of a method with a warning is marked with ‡.
-        The frame is cached: do not change it. Raises CoarticError for a study of several worlds.
+        deviations in columns whose names end in ``_sd``. Columns ``method`` and ``against`` contain
+        labels of methods. If the study has warnings about methods (:attr:`.Study.marks`), column
+        ``note`` contains them. The frame is cached: do not change it. Raises CoarticError for a
+        study of several worlds.
         """
         check_study(study)
         return _frame_of(self, study)
@@ -191,7 +194,7 @@ TABLES: dict[str, Table] = {}
 def table(
     caption: str, columns: str, *, with_settings: bool = False
 ) -> Callable[[Callable[[Study], Rows]], Table]:
-    """Return a decorator that makes a table from a function that yields its rows.
+    """Return a decorator that turns a function that yields rows into a :class:`Table`.
 
     The decorator adds the table to :data:`TABLES`. The id of the table is the name of the function
     without ``list_``, with dashes instead of underscores.
@@ -203,7 +206,7 @@ def table(
     columns : str
         A line for each column (:func:`_column_of`).
     with_settings : bool
-        True to show settings and ablations of methods, too (:attr:`Table.with_settings`).
+        True to show also settings and ablations (:attr:`Table.with_settings`).
     """
     parts = [_column_of(line) for line in columns.splitlines() if line.strip()]
 
@@ -219,7 +222,8 @@ def table(
 def _frame_of(table: Table, study: Study) -> pd.DataFrame:
     """Return a table of a study as a frame (:meth:`Table.__call__`).
 
-    Raises KeyError if an entry of a row has no column, or if no row has an entry for a column.
+    Raises KeyError if an entry of a row has no column, or if the table has rows, but no row has an
+    entry for one of the columns.
     """
     named = list(table.rows(study))
     rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
@@ -241,8 +245,9 @@ def _frame_of(table: Table, study: Study) -> pd.DataFrame:
 def _with_marks(rows: pd.DataFrame, study: Study) -> pd.DataFrame:
     """Add the warnings about methods (:attr:`.Study.marks`) to column ``note`` of a table.
 
-    If the study has warnings, and the table has rows of methods but no column ``note``, such a
-    column is inserted before column ``run_ids``. The changed table is returned.
+    The warnings are those about the methods in columns ``method`` and ``against``. If the table has
+    no column ``note``, such a column is inserted before column ``run_ids``. If the table has no
+    methods, or the study has no warnings, the table is returned unchanged.
     """
     columns = [name for name in ("method", "against") if name in rows]
     if not (study.marks and columns):
@@ -258,12 +263,12 @@ def _with_marks(rows: pd.DataFrame, study: Study) -> pd.DataFrame:
 
 
 def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
-    """Return whether each row is a setting or ablation of another row's method.
+    """Return whether each row is about a setting or ablation of another method of the table.
 
-    The method of a row is the label in column ``against``, if the table has this column, otherwise
-    the label in column ``method``. Column ``parent`` of :attr:`.Study.methods` names the method of
-    which it is a setting or an ablation. The result is a Series of booleans with the index of
-    ``frame``; all are False for a table without methods.
+    The row is about the method in column ``against``, if the table has this column, otherwise about
+    the method in column ``method``. If this method is a setting or an ablation of another method,
+    column ``parent`` of :attr:`.Study.methods` names the other method. The result is a Series of
+    booleans with the index of ``frame``. All are False for a table without column ``method``.
     """
     if "method" not in frame:
         return pd.Series(False, frame.index)
@@ -272,11 +277,9 @@ def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
 
 
 def caption_of(table: Table, study: Study) -> str:
-    """Return the caption of a table, filled in for a study.
+    """Return the caption of a table with the placeholders replaced (:attr:`Table.caption`).
 
-    ``{tasks}`` is replaced by the number of ranked tasks, and ``{reference}`` by the name of the
-    best known rewards, if the caption has them. The name of the world is added if it is not the
-    paper's world.
+    In another world than the paper's, the name of the world is added in parentheses.
     """
     caption = table.caption.replace("{tasks}", pluralize(len(ranked_tasks(study)), "task"))
     caption = caption.replace("{reference}", reference(study, study.optima))
@@ -284,11 +287,11 @@ def caption_of(table: Table, study: Study) -> str:
 
 
 def csv_of_worlds(frames: Mapping[str, pd.DataFrame]) -> str:
-    """Return a table of all worlds of a folder as one CSV file.
+    """Return a table of all worlds of a folder as the text of one CSV file (:func:`csv_of`).
 
-    ``frames`` maps each world (:attr:`.Study.worlds`) to the table in this world. The first column
-    of the file, ``world``, names the world of each row. This column is left out if the folder
-    contains only the paper's world.
+    ``frames`` maps each world (:attr:`.Study.worlds`) to the table in this world; at least one of
+    the tables must have rows. Column ``world``, after the names of the rows, names the world of
+    each row. The column is left out if the paper's world is the only one.
     """
     if [*frames] == [""]:
         return csv_of(frames[""])
@@ -301,10 +304,10 @@ def csv_of_worlds(frames: Mapping[str, pd.DataFrame]) -> str:
 
 
 def csv_of(frame: pd.DataFrame) -> str:
-    """Return a table as CSV.
+    """Return a table as the text of a CSV file.
 
-    A string that a spreadsheet would read as a formula gets an apostrophe before its first
-    character.
+    The first column, ``row``, contains the names of the rows. An apostrophe is put before each
+    string that a spreadsheet would read as a formula.
     """
 
     def guarded(value: Any) -> Any:
@@ -318,9 +321,10 @@ class ShownColumn(NamedTuple):
 
     heading: str
     texts: list[str]
-    """A string for each row: the value, with its standard deviation or interval if it has one."""
+    """A string for each row: the value, with its standard deviation or interval if it has one. A
+    missing value is ``–``."""
     is_number: bool
-    """True if all values are numbers or booleans, or all are missing."""
+    """True if the values are numbers or booleans. Numbers may be missing."""
 
 
 def shown_columns(
@@ -328,9 +332,10 @@ def shown_columns(
 ) -> dict[str, ShownColumn]:
     """Return a dict that maps names to columns as page and LaTeX show them.
 
-    These are the columns that have a heading and at least one value. A standard deviation or an
-    interval is shown in the column of its number. Methods, tasks and uses of the reward are shown
-    by their titles, with † after reconstructed tasks.
+    A column is included if it has a heading and at least one value. A standard deviation or an
+    interval is shown in the column of its number. Names of tasks and families and labels of methods
+    are replaced by titles, with † after reconstructed tasks. The use of the reward is replaced by
+    ``trial``, ``formula`` or ``none``.
 
     Parameters
     ----------
@@ -338,9 +343,9 @@ def shown_columns(
     study : Study
         Study of one world.
     frame : DataFrame
-        Rows of the table of this study.
+        Rows of the table of this study, all or some.
     in_latex : bool
-        True to return only the columns that LaTeX includes (attribute ``in_latex``).
+        True to return only the columns that LaTeX includes (:attr:`Column.in_latex`).
     """
     titles = {
         **{str(task.family): str(task.family).split("/")[0] for task in study.tasks.values()},
@@ -391,7 +396,8 @@ def _number_text(column: Column, value: float, *spread: float) -> str:
     """Return a number as a string, with its standard deviation or its interval.
 
     ``spread`` is empty, the standard deviation, or the two ends of the interval. A standard
-    deviation or interval that is NaN, and an interval of length 0, are left out.
+    deviation or interval that is NaN, and an interval of length 0, are left out. A p-value below
+    0.001 becomes ``< 0.001``.
     """
     decimals = int(column.digits) if column.digits.isdigit() else None
     if column.digits == "p":
@@ -403,14 +409,15 @@ def _number_text(column: Column, value: float, *spread: float) -> str:
 
 
 def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
-    """Return a table as HTML, made by pandas' Styler.
+    """Return rows of a table as HTML, made by pandas' Styler.
 
-    - If the table has gaps on single tasks, each cell has an id, with which the page links it to
-      runs that can be played. The cell in row 2 and column 3 has the id ``T_ID_row2_col3``, where
-      ``ID`` is the id of the table with the suffix of the world (:func:`.ending_of`).
+    - If the table has a column with the gap on each task (prefix ``on``), each cell has an id. The
+      page uses the id to link the cell to the runs that can be played. The cell in row 2 and column
+      3, counted from 0, has the id ``T_ID_row2_col3``. ``ID`` is the id of the table with the
+      suffix of the world (:func:`.ending_of`).
     - Cells without a value are empty.
     - Cells of columns that are not numbers have the class ``text``.
-    - Rows of methods from files have the class ``own``, unless all methods are from files.
+    - Cells in rows of methods from files have the class ``own``, unless all rows are such rows.
     """
     columns = shown_columns(table, study, frame)
     built_in = {""}
@@ -442,12 +449,11 @@ def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
 
 
 def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[str] = ()) -> str:
-    """Return a table as LaTeX with booktabs and longtable, made by pandas' Styler.
+    """Return rows of a table as LaTeX with booktabs and longtable, made by pandas' Styler.
 
-    The table contains the columns whose attribute ``in_latex`` is True (marked with ``tex`` in the
-    definition of the table), except columns without a value. The sentences in ``notes`` follow
-    below the table. If a dagger occurs in the table or in a note, a sentence that explains the
-    dagger is added.
+    The table contains the columns with :attr:`Column.in_latex`, except columns without a value. The
+    sentences in ``notes`` follow below the table. If a dagger occurs in the table or in a note, a
+    sentence that explains the dagger is added.
     """
     columns = shown_columns(table, study, frame, in_latex=True)
     cells = pd.DataFrame({name: map(latex, column.texts) for name, column in columns.items()})
@@ -471,10 +477,9 @@ def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[st
 
 
 def run_ids(*parts: pd.DataFrame) -> Row:
-    """Return the entry ``run_ids`` of a row: the ids of all runs, separated by spaces.
+    """Return the entry ``run_ids`` of a row: a dict with the single key ``run_ids``.
 
-    ``parts`` are frames of runs, whose ids are joined. The result is a dict with the single key
-    ``run_ids``.
+    The value consists of the ids of all runs, separated by spaces. ``parts`` are frames of runs.
     """
     return {"run_ids": " ".join(" ".join(runs.run_id.tolist()) for runs in parts)}
 
@@ -482,9 +487,9 @@ def run_ids(*parts: pd.DataFrame) -> Row:
 def _named(study: Study, runs: pd.DataFrame) -> Row:
     """Return the entries of a row that name its task, method and runs.
 
-    The runs are of one method on one task. The entries are ``task`` (title of the task,
+    ``runs`` are runs of one method on one task. The entries are ``task`` (title of the task,
     :func:`.marked`), ``method`` (label of the method), ``runs`` (number of runs) and ``run_ids``
-    (their ids).
+    (ids of the runs).
     """
     task, label = marked(study.tasks[runs.task.iloc[0]]), runs.label.iloc[0]
     return {"task": task, "method": label, "runs": len(runs), **run_ids(runs)}
@@ -502,8 +507,8 @@ COSTS = (
     ("forward_kinematics_to_half", "forward_kinematics", 0.5),
     ("seconds_to_half", "solve_s", 0.5),
 )
-"""Columns of :func:`list_runtimes`. Each has its name, its cost (one of :data:`.SPENDS`), and the
-fraction of the targets that must be reached."""
+"""Columns of :func:`list_runtimes`. Each entry consists of the name of the column, the kind of cost
+(one of :data:`.SPENDS`), and the fraction of the targets that must be reached."""
 
 
 @lru_cache(maxsize=4)
@@ -516,16 +521,16 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
     - the means of their values differ significantly. The p-values are Holm-adjusted over the tasks
       of the method.
 
-    The test is the two-sided exchange test (:func:`.exchange_test`). The value of a deterministic
-    method is exact, and the test is then the bootstrap test (:func:`.bootstrap_test`). Runs with
-    the same seed are not compared as pairs.
+    The test is the two-sided exchange test (:func:`.exchange_test`). For a deterministic method,
+    whose value is exact, it is the bootstrap test (:func:`.bootstrap_test`). The tests are not
+    paired, although runs with the same number have the same seed.
 
     Returns
     -------
     dict
         Maps the label of each method to a dict with the numbers of tasks on which it is ``better``
-        and ``worse``. A method is left out if even the smallest possible p-values would not be
-        significant after the adjustment.
+        and ``worse``. A method is left out if there is no test of it, or if even the smallest
+        ``least_p`` of its tests (:class:`.Estimate`) would not be significant after the adjustment.
     """
     counts = dict[str, dict[str, int]]()
     for label, stochastic in study.methods.stochastic.items():
@@ -558,11 +563,11 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
 def _mean_gap_after(study: Study, trials: int) -> pd.Series:
     """Return the mean gap of each method after a number of trials, over tasks.
 
-    The gap of a run is the gap of its best trial among the first ``trials`` trials. For a run whose
-    rewards of trials are not stored, the final gap is used. The mean is over runs and then over
-    tasks. The mean is NaN if a run of the method had not found a solution by then. All means are
-    NaN in a world with noise, where the best trial so far is partly luck. The result is indexed by
-    the labels of the rows of the ranking.
+    The gap of a run is the gap of its best trial among the first ``trials`` trials. If the rewards
+    of the trials of a run are not stored, the final gap of the run is used. The result is the mean
+    over tasks of the mean over runs. It is NaN for a method if one of its runs had not found a
+    solution by then. In a world with noise, where the best trial so far is partly luck, the result
+    is NaN for all methods. The Series is indexed by the labels of the rows of the ranking.
     """
     runs = compared_runs(study)
     if study.is_noisy:
@@ -582,9 +587,9 @@ def _mean_gap_after(study: Study, trials: int) -> pd.Series:
 
 
 def _standing_rows(study: Study, *, ranked: bool) -> Rows:
-    """Yield the rows of ranked methods (:func:`.standings`), or of the other methods.
+    """Yield the rows of table ``ranking`` or, if ``ranked`` is False, of table ``not-ranked``.
 
-    ``ranked`` is True for the methods that are ranked.
+    The rows are in the order of :func:`.standings`.
     """
     rows = standings(study)
     rows = rows[(rows.why == "") == ranked]
@@ -645,8 +650,10 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
 def list_ranking(study: Study) -> Rows:
     """Yield a row for each ranked method (:func:`.standings`), the smallest gap first.
 
-    A row contains the mean gap and the mean share of the possible gain over tasks, the gap on each
-    individual task, the mean gap after 1,000 trials, and the mean costs of a run. Gaps and shares
+    A row contains means over tasks of the gap, of the share of the possible gain, of the gap with
+    motor noise 0.01, and of the gap after 1,000 trials (``gap_early``). It also contains the gap on
+    each individual task, and the mean costs of a run. Columns ``better`` and ``worse`` are numbers
+    of individual tasks on which the method differs significantly from the learner. Gaps and shares
     are fractions.
     """
     return _standing_rows(study, ranked=True)
@@ -672,9 +679,9 @@ def list_ranking(study: Study) -> Rows:
 def list_not_ranked(study: Study) -> Rows:
     """Yield a row for each method that is not ranked (:func:`.standings`), with the reason.
 
-    The row also contains the gap on each individual task. If the method solved all runs, but was
-    asked for another number of trials than the ranked methods, the row also contains the mean gap
-    of the method over tasks.
+    A row contains the gap on each individual task, a fraction. If the method solved all runs on all
+    ranked tasks, but was asked for another number of trials than the ranked methods, the row also
+    contains its mean gap over tasks.
     """
     return _standing_rows(study, ranked=False)
 
@@ -693,11 +700,11 @@ def list_not_ranked(study: Study) -> Rows:
     """,
 )
 def list_differences(study: Study) -> Rows:
-    """Yield the difference of each method's gap from that of a reference method.
+    """Yield the difference between each method's mean gap and that of a reference method.
 
-    The difference is the mean gap of the other method minus the mean gap of the reference method,
-    over the tasks on which the reference method solved all runs. Rows are in ascending order of the
-    difference. The reference method is
+    The difference is the mean gap of the method minus the mean gap of the reference method, a
+    fraction. Both means are over the tasks on which the reference method solved all runs. The rows
+    with the same reference method are in ascending order of the difference. The reference method is
 
     - :attr:`.Study.against`, if it is not empty;
     - otherwise, if the study varies parameters, the first setting of the ranking;
@@ -707,7 +714,8 @@ def list_differences(study: Study) -> Rows:
     A method is left out if
 
     - on one of the tasks of the comparison, the method has no runs or a failed run;
-    - it was asked for another number of trials than the reference method;
+    - it was asked for another number of trials than the reference method, unless all numbers of
+      trials are ranked together (:func:`.ranking_budget` is None);
     - it is a setting or an ablation of a method that ran (column ``parent`` of
       :attr:`.Study.methods`).
 
@@ -753,9 +761,9 @@ that is the exact gap of a deterministic method."""
 def _gaps_by_task(study: Study, method: str, tasks: Sequence[str]) -> _Gaps:
     """Return the gaps of a method on each task, in the order of ``tasks``.
 
-    ``method`` is the label of the method, which must have runs on all tasks in ``tasks``. For each
-    task, the result contains an array with the gaps of the runs or, for a deterministic method, a
-    float: the exact gap.
+    ``method`` is the label of the method or of a row of the ranking, with runs on all tasks in
+    ``tasks``. For each task, the result contains an array with the gaps of the runs or, for a
+    deterministic method, a float: the exact gap.
     """
     by_task = runs_on(study, method, tasks).groupby("task").gap
     gaps = [by_task.get_group(task).to_numpy(np.float64) for task in tasks]
@@ -766,16 +774,17 @@ def _mean_of_gaps(gaps: _Gaps) -> Estimate:
     """Return the mean gap over tasks, with its interval for other runs.
 
     The result is the mean over tasks of the mean over runs. There is no interval if all gaps are
-    exact.
+    exact, or if a sample has fewer than five runs.
     """
     return _sum_of_gaps([(1 / len(gaps), of) for of in gaps])
 
 
 def _difference_of_gaps(first: _Gaps, second: _Gaps) -> Estimate:
-    """Return the mean gap of a first method minus that of a second.
+    """Return the mean gap of a first method minus the mean gap of a second method.
 
     Both means are over the same tasks. The interval is for other runs on these tasks. The p-value
-    is that of :func:`.stratified_test`. If all gaps are exact, there is no interval and no p-value.
+    is that of :func:`.stratified_test`. There is no interval and no p-value if all gaps are exact,
+    or if a sample has fewer than five runs.
     """
     parts = [(sign / len(of), gaps) for sign, of in ((1, first), (-1, second)) for gaps in of]
     p = stratified_test([*zip(first, second, strict=True)])
@@ -785,7 +794,9 @@ def _difference_of_gaps(first: _Gaps, second: _Gaps) -> Estimate:
 def _sum_of_gaps(parts: Sequence[tuple[float, Array | float]]) -> Estimate:
     """Return a weighted sum of mean gaps, with its interval for other runs.
 
-    Each part is a pair: a weight, and the gaps of runs on a task or an exact gap.
+    Each part is a pair: a weight, and either an array with the gaps of the runs on a task or a
+    float, the exact gap. There is no interval if all gaps are exact, or if an array has fewer than
+    five gaps.
     """
     exact = sum(weight * gaps for weight, gaps in parts if isinstance(gaps, float))
     drawn = [(weight, gaps) for weight, gaps in parts if not isinstance(gaps, float)]
@@ -797,31 +808,33 @@ def _sum_of_gaps(parts: Sequence[tuple[float, Array | float]]) -> Estimate:
 
 
 class ValueOfParameter(NamedTuple):
-    """A value of a parameter that a study varies, with its settings."""
+    """A value of a parameter that a study varies, with the settings that are compared."""
 
     value: Any
     labels: list[str]
-    """Labels of the settings that have this value. Settings at the same position in the lists of
-    two values of a parameter have the same values of all other parameters."""
+    """Labels of the settings with this value that are compared (:func:`values_of_parameters`).
+    Settings at the same position in the lists of two values of a parameter have equal values of all
+    other parameters."""
     at_best: str
-    """Label of the setting with this value whose other parameters have the values of the best
-    setting; empty if there is none."""
+    """Label of the compared setting with this value whose other parameters have the same values as
+    in the best setting; empty if there is none."""
 
 
 @lru_cache(maxsize=4)
 def values_of_parameters(study: Study) -> dict[str, list[ValueOfParameter]]:
-    """Return the values of each varied parameter that can be compared, with their settings.
+    """Return the values of each varied parameter, with the settings that can be compared.
 
-    The values of a parameter are compared at equal values of all other parameters. Therefore a
-    combination of values of the other parameters is used only if the settings with this combination
-    are ranked for all values of the parameter that occur among ranked settings.
+    The values of a parameter are compared at equal values of all other parameters. Only ranked
+    settings are compared. A combination of values of the other parameters is used only if it was
+    ranked together with each ranked value of the parameter.
 
     Returns
     -------
     dict of str to list of ValueOfParameter
-        Maps the name of each parameter to its values. A list is empty if no combination can be
-        used, or if only one value is ranked. The dict is empty if the study does not vary
-        parameters, or if fewer than two settings are ranked. The dict is cached: do not change it.
+        Maps the name of each parameter to its values; numbers are in ascending order. A list is
+        empty if no combination can be used, or if only one value is ranked. The dict is empty if
+        the study does not vary parameters, or if fewer than two settings are ranked. The dict is
+        cached: do not change it.
     """
     ranked = standings(study).query("why == ''").index
     varied = study.varied[study.varied.index.isin(ranked)]
@@ -850,12 +863,12 @@ def values_of_parameters(study: Study) -> dict[str, list[ValueOfParameter]]:
 
 
 def gaps_of_settings(study: Study, labels: Sequence[str]) -> pd.Series:
-    """Return the mean gap, over settings, of runs with the same task and number.
+    """Return the mean gap over settings, for each task and number of a run.
 
-    Runs of different settings with the same number have the same seed. Therefore the mean of their
-    gaps is the unit of resampling. ``labels`` are the labels of the settings. The result is a
-    Series of fractions, indexed by task and number of the run. A task and a number are left out if
-    a setting has no run of this number on the task.
+    Runs with the same number on a task have the same seed in all settings. Therefore the mean of
+    their gaps is the unit of resampling. ``labels`` are the labels of the settings. The result is a
+    Series of fractions, indexed by task and number of the run. A pair of task and number is left
+    out if one of the settings has no such run.
     """
     runs = compared_runs(study)
     runs = runs[runs.label.isin(labels)]
@@ -879,17 +892,20 @@ def gaps_of_settings(study: Study, labels: Sequence[str]) -> pd.Series:
     """,
 )
 def list_parameters(study: Study) -> Rows:
-    """Yield a row for each value of each parameter that the study varies.
+    """Yield a row for each value of each varied parameter whose values can be compared.
 
-    - ``gap``: mean gap over the settings with this value (:func:`values_of_parameters`) and over
-      tasks, a fraction, with its interval for other runs on the same tasks;
-    - ``at_best``: gap of the setting that has this value, and the values of the best setting in all
-      other parameters;
+    :func:`values_of_parameters` says which values can be compared. Columns:
+
+    - ``gap``: mean gap over the compared settings with this value and over tasks, a fraction, with
+      its interval for other runs on the same tasks;
+    - ``at_best``: gap of the setting that has this value, and in all other parameters the values of
+      the best setting. It is NaN if this setting is not compared;
     - ``difference`` and ``p_holm``: difference from the value with the smallest gap, and its
-      p-value, as in :func:`list_differences`. The p-values are Holm-adjusted over the values of the
-      parameter;
-    - ``default``: what the default value is called; empty for any other value;
-    - ``equal``: True if the parameter has no effect: each run gets the same score at all values.
+      p-value (:func:`.stratified_test`), Holm-adjusted over the values of the parameter. Both are
+      NaN for the value with the smallest gap itself;
+    - ``default``: name of the default value (:func:`.default_name`); empty for any other value;
+    - ``equal``: True if the parameter has no effect, that is, each run has the same score at all
+      values.
     """
     tasks, ranks, methods = ranked_tasks(study), standings(study), study.methods
     for parameter, values in values_of_parameters(study).items():
@@ -925,11 +941,11 @@ def list_parameters(study: Study) -> Rows:
 
 
 def _are_equal(study: Study, settings: Sequence[Sequence[str]]) -> bool:
-    """Return True if a parameter has no effect: all its values give the same results.
+    """Return True if a parameter has no effect: all its values give the same scores.
 
     ``settings`` contains a list of labels of settings for each value of the parameter. Settings at
-    the same position of two lists differ only in this parameter. Runs of such settings with the
-    same task and number are compared by their scores (column ``value`` of :attr:`.Study.runs`).
+    the same position in two lists differ only in this parameter. Their runs with the same task and
+    number are compared by their scores (column ``value`` of :attr:`.Study.runs`).
     """
     by_run = compared_runs(study).set_index(["task", "run"])
     for labels in zip(*settings, strict=True):
@@ -968,12 +984,18 @@ def _are_equal(study: Study, settings: Sequence[Sequence[str]]) -> bool:
     with_settings=True,
 )
 def list_contexts(study: Study) -> Rows:
-    """Yield a row for each method, pair of tasks, shared goal, and hand.
+    """Yield a row for each method, pair of tasks, shared goal, and hand (:func:`.shared_goals`).
 
-    A row contains the posture difference between the two tasks, with a verdict, and the lean
-    (:func:`.lean`); both are also computed from the base alone and from the joints alone. For
-    comparison, the row also contains the posture difference of random search. The p-values are
-    Holm-adjusted over the rows of the method.
+    A row contains, among other columns,
+
+    - the posture difference between the two tasks and the lean (:func:`.lean`), for the whole
+      posture, for the base alone (``_base``) and for the joints alone (``_joints``);
+    - ``verdict``: a verdict on the posture difference in words;
+    - ``p_holm``: p-value of the permutation test of the posture difference, Holm-adjusted over the
+      rows of the method;
+    - ``control`` and ``p_random_search``: posture difference of random search, and p-value of the
+      test against random search (:meth:`.TwoContexts.p_beyond`), which is not adjusted. Both are
+      NaN if there is no such random search (:func:`.contexts_of_control`).
     """
     for label in study.methods.index:
         contexts = list(shared_goals(study, label))
@@ -1007,10 +1029,10 @@ def list_contexts(study: Study) -> Rows:
 
 
 def _columns_by_part(shared: TwoContexts) -> Row:
-    """Return the columns of a comparison for the base and the joints alone.
+    """Return the columns of a comparison for the base alone and for the joints alone.
 
-    The columns are the posture difference, the lean, and the distance between the mean next
-    postures.
+    The columns contain the posture difference and the lean, both with their intervals, and the
+    distance between the mean next postures.
     """
     row: Row = {}
     for part in ("base", "joints"):
@@ -1051,14 +1073,15 @@ def list_signatures(study: Study) -> Rows:
 
     Searches for the optimum are left out. For each other method on each task, there are
 
-    - a row for each hand sequence that occurs in at least a tenth of the method's solved runs
-      (:func:`.with_control`);
+    - a row for each hand sequence that at least a tenth of the method's solved runs have
+      (:func:`.with_control`), if at least one signature is defined for these runs;
     - a row for the choice of hands itself, with an empty entry in column ``hands``, if the task is
       for two arms and has at least two goals.
 
     Signatures are means over runs. If a method selects its solution from trials
-    (:func:`.selects`), its rows also contain the signatures of random search and the p-value of the
-    one-sided exchange test, which is not adjusted for multiple tests. Column ``control_idle_arm``
+    (:func:`.selects`), and the study has runs of random search to compare with, the rows also
+    contain the mean signatures of random search and the p-value of the one-sided exchange test,
+    which is not adjusted for multiple tests. On a task for two arms, column ``control_idle_arm``
     says how random search treats the idle arm: ``with noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
@@ -1099,12 +1122,13 @@ def list_signatures(study: Study) -> Rows:
 def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
     """Return the verdict on whether the posture at a shared goal depends on later goals.
 
-    - The postures of a stochastic method differ if the permutation test is significant. They are
-      the same if the bootstrap test shows that their difference is below :data:`.SAME`.
+    - The postures of a stochastic method differ if the permutation test is significant after the
+      Holm adjustment. They are the same if the bootstrap test shows that their difference is below
+      :data:`.SAME`. If both hold, the postures are different, but the difference is negligible.
     - The postures of a deterministic method differ if their difference exceeds :data:`ROUNDING`.
-      They are the same if it is below :data:`.SAME`.
-    - If postures differ, and the method selects its solution from trials, the difference must also
-      exceed that of random search significantly.
+      They are the same if their difference is below :data:`.SAME`.
+    - If postures differ by more than a negligible difference, and the method selects its solution
+      from trials, the difference must also be significantly larger than that of random search.
 
     Parameters
     ----------
@@ -1154,13 +1178,14 @@ def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
     """,
 )
 def list_saved(study: Study) -> Rows:
-    """Yield how many ticks more than the corrective process each method takes for each goal.
+    """Yield the ticks of each method for each goal, minus those of the corrective process alone.
 
-    There is a row for each individual task and each method that solved a run of the task; searches
-    for the optimum are left out. Columns ``by_goal_1``, ``by_goal_2`` and so on, and their ``sum``,
-    are means over runs: ticks of the run minus the ticks of the corrective process alone with the
-    same hand sequence. A run is left out if the corrective process does not complete the task with
-    the hands of the run. A row without runs is left out.
+    There is a row for each individual task and each method that solved a run on the task; searches
+    for the optimum are left out. Columns ``by_goal_1``, ``by_goal_2`` and so on, and their sum in
+    column ``sum``, are means over runs: the ticks of the run minus the ticks of the corrective
+    process alone with the same hand sequence. Only the first 500 solved runs are used. A run is
+    left out if the corrective process does not complete the task with the hands of the run. A row
+    without runs is left out.
     """
     for (task, label), runs in study.cells.items():
         if (
@@ -1195,12 +1220,17 @@ def list_saved(study: Study) -> Rows:
 def list_runtimes(study: Study) -> Rows:
     """Yield the cost at which each method reaches a quarter and half of the targets.
 
-    The columns are those of :data:`COSTS`, and ``reached``, the fraction of targets that the method
-    reaches at any cost. For a method that uses the reward of each trial, each column ``half on
-    TASK`` is the median, over runs on this task, of the number of trials to the target halfway to
-    the best known reward. The median is infinite if more than half of the runs do not reach this
-    target. Methods without a solution, or with an unknown number of trials, are left out. In a
-    world with noise there are no rows.
+    There is a row for each method of :func:`.runs_with_targets`. Methods without a solution, or
+    with an unknown number of trials on a task, are left out. In a world with noise there are no
+    rows. Columns:
+
+    - the columns of :data:`COSTS`; NaN if the cost of the method's runs on a task is unknown;
+    - ``reached``: the fraction of targets that the method reaches at any cost;
+    - ``trials``: the largest number of trials of a run;
+    - ``half on TASK``, only for a method that uses the reward of each trial: the median, over runs
+      on this task, of the number of trials to the target halfway between the reward of the
+      corrective process alone and the best known reward. The median is infinite if more than half
+      of the runs do not reach this target.
     """
     for method, runs in runs_with_targets(study).items():
         times = {spend: times_on_tasks(study, runs, spend) for spend in SPENDS}
@@ -1235,10 +1265,13 @@ def list_learning(study: Study) -> Rows:
     """Yield the mean best reward of each method after 100, 1,000 and 10,000 trials.
 
     There is a row for each individual task and each method, provided that each run of the method on
-    the task is solved, made at least 100 trials, and has stored rewards. Searches for the optimum
-    are left out. Rewards are means over runs of the best reward so far, in negative ticks, after
-    each number of trials in :data:`BUDGETS`. A mean is NaN if a run made fewer trials than that, or
-    had not found a solution by then. In a world with noise there are no rows.
+    the task is solved, made at least 100 trials, and has stored rewards of its trials. Searches for
+    the optimum are left out. In a world with noise there are no rows.
+
+    Columns ``after_100``, ``after_1000`` and ``after_10000`` are means over runs of the best reward
+    so far, in negative ticks. A mean is NaN if a run made fewer trials than that, or had not found
+    a solution by then. Column ``corrective_best`` is the reward of the corrective process alone
+    (:attr:`.Study.corrective_best`).
     """
     if study.is_noisy:  # the best trial so far is partly luck
         return
@@ -1260,8 +1293,8 @@ def list_learning(study: Study) -> Rows:
 def _instances(study: Study) -> dict[str, list[str]]:
     """Return a dict that maps each family to the names of its instances.
 
-    Instances are random tasks of a family. Instances without a best known reward are left out. The
-    dict is cached: do not change it.
+    Instances are random tasks of a family. Instances without a best known reward, and families
+    without any other instance, are left out. The dict is cached: do not change it.
     """
     families: dict[str, list[str]] = {}
     for name in study.optima:
@@ -1272,11 +1305,11 @@ def _instances(study: Study) -> dict[str, list[str]]:
 
 @lru_cache(maxsize=4)
 def instance_runs(study: Study) -> pd.DataFrame:
-    """Return each method's runs on the instances that it solved in all runs.
+    """Return the runs of each method on the instances on which all its runs are solved.
 
-    Instances without a best known reward are left out. Runs are sorted by family and instance, as
-    in :func:`_instances`. Column ``method`` contains the label of the row of the ranking to which
-    the method belongs. The frame is cached: do not change it.
+    Instances without a best known reward are left out. Runs are sorted by family and instance, in
+    the order of :func:`_instances`. Column ``method`` contains the label of the row of the ranking
+    to which the run belongs. The frame is cached: do not change it.
     """
     runs = compared_runs(study)
     names = [*itertools.chain.from_iterable(_instances(study).values())]
@@ -1300,8 +1333,8 @@ def gaps_by_family(study: Study, runs: pd.DataFrame) -> Scores:
     -------
     dict
         Maps each family to a list with an array for each instance: the gaps of the runs on this
-        instance, fractions, shape ``(runs,)``. A family is left out if one of its instances has no
-        run in ``runs``.
+        instance, fractions, shape ``(runs,)``. A family is left out if one of its instances with a
+        best known reward has no run in ``runs``.
     """
     return {
         str(family): [
@@ -1323,17 +1356,22 @@ def gaps_by_family(study: Study, runs: pd.DataFrame) -> Scores:
     """,
 )
 def list_family_gaps(study: Study) -> Rows:
-    """Yield each method's mean gap on instances, by family and over families.
+    """Yield each method's mean gap on instances, for each family and over families.
 
-    Column ``gap`` is the mean over the families with two arms, and each column ``in FAMILY`` is the
-    mean in this family; both are fractions. Intervals are for other tasks of the families. If a
-    method did not solve all runs on all instances of a family, column ``in FAMILY`` is NaN for this
-    family. If the robots of this family have two arms, ``gap`` is NaN, too.
+    A family *has two arms* if its tasks may be solved with both hands. Only instances with a best
+    known reward are used. Columns:
 
-    Column ``instances`` is the number of instances on which all runs of the method are solved, and
-    column ``missing`` is the number of all other instances. Both are numbers of instances of
-    families with two arms. For a method that ran only on families with one arm, they are numbers of
-    instances of the families on which the method ran.
+    - ``in FAMILY``: mean gap over the instances of the family, a fraction. It is NaN unless the
+      method has runs on all instances of the family, and all these runs are solved;
+    - ``gap``: mean of ``in FAMILY`` over all families with two arms. It is NaN if one of them is
+      NaN, or if there is no such family;
+    - ``instances``: number of instances on which the method has runs and all of them are solved;
+    - ``missing``: number of all other instances.
+
+    ``instances`` and ``missing`` count only instances of families with two arms. For a method that
+    ran on no such family, they count the instances of the families on which the method ran.
+    Intervals are for other tasks of the families. Methods without runs on instances are left out.
+    Rows are in ascending order of ``gap``; rows in which it is NaN come last.
     """
     solved_runs, rows, families = instance_runs(study), list[tuple[str, Row]](), _instances(study)
     two_armed = {family for family in families if len(study.tasks[families[family][0]].hands) > 1}
@@ -1370,12 +1408,15 @@ def list_family_gaps(study: Study) -> Rows:
     """,
 )
 def list_tasks(study: Study) -> Rows:
-    """Yield each task's best known reward, and that of the corrective process alone.
+    """Yield the best known reward of each task, and the rewards of the corrective process alone.
 
     There is a row for each individual task. Columns ``initial`` and ``best_hands`` are the rewards
-    of the corrective process alone with the initial hands of the task and with the best hands. All
-    rewards are negative ticks. In a world with noise, ``initial`` is missing, and ``best_hands`` is
-    the reward of :attr:`.Study.corrective_best`.
+    of the corrective process alone with the initial hands of the task and with the best hands. A
+    reward is missing if the corrective process does not complete the task with these hands.
+    ``best_hands`` is also missing if the task has more than 4,096 hand sequences. In a world with
+    noise, ``initial`` is missing, and ``best_hands`` is :attr:`.Study.corrective_best`. Columns
+    ``optimum``, ``source`` and ``bound`` are the best known reward, its source and its proven bound
+    (:class:`.BestKnown`). All rewards are negative ticks.
     """
     for name, task in study.individual_tasks.items():
         best, locked = study.optima.get(name), " and ".join(task.locked_base)
@@ -1419,8 +1460,11 @@ def list_methods(study: Study) -> Rows:
 
     Rewards are negative ticks; in a world with noise they are minus the mean ticks of a run. Within
     a task, searches for the optimum come first, and the other methods follow. Both groups are in
-    descending order of the mean reward. Column ``median_run`` contains the first characters of the
-    id of the run whose score is nearest to the median; the entry is None if no run is solved.
+    descending order of the mean reward. Column ``gap`` is the mean gap of the solved runs, a
+    fraction. Column ``hands`` lists the hand sequences of the solved runs with their frequencies
+    (:func:`.tally`), or contains the hand sequence of the only solved run. Column ``median_run``
+    contains the first eight characters of the id of the run whose score is nearest to the median;
+    the entry is None if no run is solved.
     """
     places, rows = {task: place for place, task in enumerate(study.individual_tasks)}, []
     for (task, label), runs in study.cells.items():
@@ -1457,10 +1501,10 @@ def list_methods(study: Study) -> Rows:
     """,
 )
 def list_failed(study: Study) -> Rows:
-    """Yield the number of failed runs of each method and task, with reasons.
+    """Yield the number of failed runs of each method on each task, with reasons.
 
-    There is a row for each method and task with at least one failed run. The row contains the three
-    most frequent reasons.
+    There is a row for each pair of a task and a method with at least one failed run. Column
+    ``reasons`` contains the three most frequent reasons with their numbers of runs.
     """
     for (task, label), runs in study.cells.items():
         if len(solved(runs)) < len(runs):

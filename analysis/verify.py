@@ -13,18 +13,18 @@ The rules (Shah, Barto & Fagg 2013, *A Dual Process Account of Coarticulation in
 Acquisition*):
 
 - A robot, a mobile base with two arms, hits goals with its hands, in order. Each goal has one hand.
-- A configuration q has x and y of the base, then the angles of the left arm and of the right arm.
+- A configuration q has x and y of the base, the angles of the left arm, and those of the right arm.
 - A movement goes straight from q to a target q^t in steps of length m. Its last step, which can be
   shorter, ends at q^t.
 - Before each step the robot checks whether to stop. It stops if its hand is within the radius of
-  the goal (a hit). In a learned or planned movement, it also stops if its hand is within θ^a of the
-  position that it would have at q^t (arrival).
+  the goal (a hit). In a learned or planned movement, it also stops if its hand is within the
+  tolerance θ^a of the position that the hand would have at q^t (arrival).
 - A step costs one tick, and stopping costs one more. The reward is minus the sum of all ticks.
 - The first movement for a goal is always made, unless it is corrective. Any other movement is only
   made if the goal is not hit yet.
-- A movement of kind *path* leads through waypoints. It stops on a hit, or at its end.
+- A movement of kind *path* leads through waypoints. It stops on a hit, or at the last waypoint.
 - The targets of corrective movements are stored; the corrective process is not run again.
-- With motor noise a run stores what its method recommends, without ticks: it is not executed.
+- With motor noise, only goals, hands and targets are checked. A run then stores no ticks.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-STATED = {  # columns of table results that describe each part of a run with stored movements
+STATED = {  # columns of table results that describe each part of a run
     "solution": ("reward", "hands", "solution_corrections", "other_arm_travel"),
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
@@ -105,8 +105,8 @@ def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
 def stored_task(content: str) -> Any:
     """Return the task of a cell, read from the cell's stored JSON.
 
-    The task has attributes that a task file lacks: constants of the motion model (``model``), the
-    start (``q0``), ``locked`` coordinates, ``arms``, ``digest`` (hash) and ``labels`` of the cell.
+    Attributes are added: constants of the motion model (``model``), start (``q0``), indices of
+    ``locked`` coordinates, ``arms``, and the cell's ``digest`` (hash) and ``labels``.
     """
     plain = json.loads(content)
     cell = json.loads(content, object_hook=lambda values: SimpleNamespace(**values))
@@ -130,7 +130,7 @@ def stored_task(content: str) -> Any:
 
 
 def scaled(changes: Floats, model: Any) -> Floats:
-    """Return the weighted sizes of changes, whose norm is a movement's length: ``(..., dof)``."""
+    """Return the absolute changes, those of the base multiplied by its weight: ``(..., dof)``."""
     sizes = np.abs(changes)
     sizes[..., :2] *= model.base_weight
     return sizes
@@ -156,8 +156,8 @@ def straight_path_points(q: Floats, target: Floats, model: Any) -> Floats:
 def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
     """Return the points of a path from ``q`` through waypoints, shape ``(dof, points)``.
 
-    ``waypoints``, shape ``(waypoints, dof)``, contains a row for each waypoint. The points are
-    spaced by ``model.step`` along the path from ``q``; the last point is the end of the path.
+    ``waypoints`` has shape ``(W, dof)``. The points are spaced by ``model.step`` along the path;
+    the last point is the last waypoint, and the step to it can be shorter.
     """
     corners = np.array([q, *waypoints])
     sizes = scaled(np.diff(corners, axis=0), model)
@@ -173,10 +173,10 @@ def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
 def make(
     task: Any, q: Floats, goal: int, hand: str, kind: str, corners: Floats
 ) -> tuple[Floats, int, bool]:
-    """Make a movement from ``q``, and return its end, its ticks, and whether it hits.
+    """Make a movement from ``q``; return the configuration at its end, its ticks, and if it hits.
 
-    ``corners``, shape ``(rows, dof)``, consists of the target as the only row or, for a path, of a
-    row for each waypoint. ``goal`` is the number of the goal, from 1.
+    ``corners`` has shape ``(rows, dof)``. For a path, its rows are the waypoints; for any other
+    movement, its only row is the target. ``goal`` is the number of the goal, from 1.
     """
     model, is_path = task.model, kind == "path"
     points = path(q, corners, model) if is_path else straight_path_points(q, corners[-1], model)
@@ -193,13 +193,13 @@ def make(
 
 
 def _recompute(task: Any, movements: list[list[Any]]) -> tuple[Any, ...]:
-    """Make all movements of a part of a run again.
+    """Make all movements of a part of a run again; with motor noise, only check them.
 
     Each movement is a list of its goal (from 1), hand, kind, ticks, and path as JSON. Raises
     ValueError if a rule is broken, or if ticks differ from the stored ticks.
 
-    Returns reward, letters of the hands, number of corrective movements, and joint-space distance
-    (rad) that idle arms travel, summed over goals. With noise, returns None and the letters.
+    Returns reward, letters of the hands, number of corrective movements that take ticks, and joint
+    travel of the idle arm (rad), summed over goals. With noise, returns None and the letters.
     """
     goals = [movement[0] for movement in movements]
     order = [*range(1, len(task.goals) + 1)]
@@ -242,9 +242,9 @@ class Report(NamedTuple):
     """Result of :func:`check_runs`."""
 
     runs: int  # number of runs that were checked
-    movements: int  # number of movements that were executed
-    wrong: list[str]  # a sentence for each run that differs
-    unfinished: list[str]  # a sentence if runs of the plan are missing, otherwise empty
+    movements: int  # number of stored movements of the runs that do not differ
+    wrong: list[str]  # a sentence for each run that differs or cannot be read
+    unfinished: list[str]  # one sentence if runs of the plan are missing, otherwise empty
 
 
 def check_runs(folder: Path) -> Report:
@@ -278,7 +278,7 @@ def check_runs(folder: Path) -> Report:
 
 
 def _check_run(row: Any) -> int:
-    """Execute the stored movements of a run, and return their number.
+    """Check a run, and return the number of its stored movements.
 
     Raises ValueError if the results differ, or if id, seed or labels belong to another run.
     """

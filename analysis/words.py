@@ -1,4 +1,4 @@
-"""Write numbers and names alike on the page, in tables and on the terminal."""
+"""Format numbers and names in the same way for the page, for tables and for the terminal."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ _LATEX = str.maketrans(
         **{NARROW_SPACE: "\\,", "σ": "$\\sigma$", "ε": "$\\epsilon$"},
     }
 )
-"""Translation table for ``str.translate``: special characters of LaTeX and BibTeX, and symbols that
-coartic itself writes, to LaTeX commands."""
+"""Translation table for ``str.translate``. It maps special characters of LaTeX and BibTeX, and
+symbols that coartic itself writes, to LaTeX commands."""
 
 
 def id_of(function: Callable[..., Any]) -> str:
@@ -52,9 +52,12 @@ def number(value: float, digits: _Digits | None = None) -> str:
     value : float
         The number. NaN becomes ``–``, and infinity ``∞``.
     digits : int, optional
-        Number of decimals. By default, an integer has no decimals, and any other number has three
-        significant figures. By default, a number between −0.0001 and 0.0001 has two significant
-        figures and an exponent, as in ``1.2e−05``.
+        Number of decimals. By default, it depends on the number:
+
+        - An integer has no decimals.
+        - Any other number whose size is below 0.0001 has two significant figures and an exponent,
+          as in ``1.2e−05``.
+        - All other numbers have three significant figures, or no decimals from 100 on.
 
     Returns
     -------
@@ -96,8 +99,8 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
     """Return an interval as a string such as ``[1.3, 2.9]``.
 
     ``digits`` is the number of decimals; by default :func:`number` chooses it. The result is the
-    empty string if an end is NaN, or if both ends are equal, because this would look like
-    certainty.
+    empty string if an end is NaN. It is also empty if both ends are equal, because an interval of
+    length 0 would look like certainty.
     """
     if math.isnan(low) or math.isnan(high) or low == high:
         return ""
@@ -105,7 +108,7 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
 
 
 def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, unit: str = "") -> str:
-    """Return a number of a table with its interval as a string.
+    """Return a number in a row of a table, with its interval, as a string.
 
     Parameters
     ----------
@@ -130,7 +133,7 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
     Raises
     ------
     CoarticError
-        The row does not have these numbers.
+        The row lacks one of the three numbers.
 
     Examples
     --------
@@ -152,10 +155,11 @@ def titled_apart(tasks: Iterable[Task]) -> list[Task]:
 
     A task that needs another title is replaced by a copy with this title:
 
-    - If a changed task, such as ``ascending.radius-0.2``, has the title of the original task, the
-      change is added to the title: ``Ascending, radius-0.2``.
-    - If several tasks still have the same title, the name of the task is added to each of these
-      titles.
+    - The change is added to the title of a changed task if this title, in lower case and with
+      dashes for spaces, is the name of the original task. ``ascending.radius-0.2``, for example,
+      gets the title ``Ascending, radius-0.2``.
+    - If several tasks then have the same title, the name of the task is added, in parentheses, to
+      each of these titles.
     """
     tasks, titles = [*tasks], []
     for task in tasks:
@@ -174,15 +178,15 @@ def titled_apart(tasks: Iterable[Task]) -> list[Task]:
 
 
 def marked(task: Task) -> str:
-    """Return the title of a task, followed by † if its goals are reconstructed.
+    """Return the title of a task, followed by † if a part of the task is reconstructed.
 
-    :data:`RECONSTRUCTED` explains the dagger.
+    :data:`RECONSTRUCTED` is the sentence that explains the dagger to readers.
     """
     return f"{task.label} †" if task.reconstructed else task.label
 
 
 def tally(names: Iterable[str]) -> str:
-    """Return how often each name occurs, as in ``LRLR 17, RRLR 3``.
+    """Return names with the numbers of their occurrences, as in ``LRLR 17, RRLR 3``.
 
     The most frequent name comes first. Names that are equally frequent are in alphabetical order.
     The result is ``–`` if there are no names.
@@ -194,8 +198,8 @@ def tally(names: Iterable[str]) -> str:
 def commonest(texts: Iterable[str], most: int | None = 3) -> list[str]:
     """Return the most frequent strings with their counts, as in ``12 × no hit``.
 
-    The list is in descending order of frequency. It has at most ``most`` entries, or all if
-    ``most`` is None.
+    The list is in descending order of frequency. It has at most ``most`` entries; if ``most`` is
+    None, it has an entry for each distinct string.
     """
     return [f"{count} × {text}" for text, count in Counter(texts).most_common(most)]
 
@@ -217,9 +221,9 @@ def capital(text: str) -> str:
 def slugs(names: Iterable[str]) -> dict[str, str]:
     """Return a dict that maps each name to a unique slug for file names.
 
-    A slug consists of small letters, digits and dashes, and has at most 80 characters before a
-    number. If two names would have the same slug, such as ``a-b``, the second gets a number:
-    ``a-b-2``.
+    A slug consists of the lower-case letters a to z, digits and dashes. It has at most 80
+    characters, before a number. If two names would have the same slug, such as ``a-b``, a number is
+    added to the second slug: ``a-b-2``. A name without such letters and digits gets the slug ``x``.
     """
     slug_of: dict[str, str] = {}
     for name in names:
@@ -234,9 +238,10 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
 
 
 def ending_of(study: Study) -> str:
-    """Return the suffix of ids of tables and figures in a world, such as ``-motor-noise-0-01``.
+    """Return the suffix of ids for the world of a study, such as ``-motor-noise-0-01``.
 
-    The suffix is empty for the paper's world. Raises CoarticError for a study of several worlds.
+    The ids are those of tables, figures and sections of the page. The suffix is empty for the
+    paper's world. Raises CoarticError for a study of several worlds.
     """
     return f"-{slugs([study.world])[study.world]}" if study.world else ""
 
@@ -244,6 +249,6 @@ def ending_of(study: Study) -> str:
 def latex(text: object) -> str:
     """Return text as one printable line for LaTeX and BibTeX, with special characters escaped.
 
-    Letters that pdfLaTeX does not know are kept; XeLaTeX and LuaLaTeX print them.
+    Letters that pdfLaTeX cannot print are kept; XeLaTeX and LuaLaTeX can print them.
     """
     return one_line(str(text)).translate(_LATEX)

@@ -77,21 +77,22 @@ from coartic.tasks.task import shipped_tasks
 
 @figure("Gap to the best reward", "Ticks of the mean beyond the {reference}, in per cent of it")
 def draw_ranking(study: Study) -> Parts | None:
-    """Draw the gap of each ranked method, or of each value of varied parameters.
+    """Draw the mean gap of each ranked method, or of each value of the varied parameters.
 
-    If a study varies parameters, but their values cannot be compared, the gaps of ranked methods
-    are drawn. The result is None if no method is ranked.
+    If a study varies parameters, and their values can be compared (:func:`.values_of_parameters`),
+    the gaps of the values are drawn. Otherwise the gaps of ranked methods are drawn, without
+    settings and ablations of methods that are drawn. The result is None if no method is ranked.
     """
     return _draw_parameters(study) or _draw_gaps(study)
 
 
 def _draw_parameters(study: Study) -> Parts | None:
-    """Draw the gap of each value of each varied parameter, a panel for each.
+    """Draw the mean gap of each value of each varied parameter, in a panel for each parameter.
 
     A panel shows the means of table ``parameters``. If several parameters vary, a panel also shows
-    the gaps at the best values of the other parameters. If only one parameter varies, the panel
-    also shows the gaps on each task. Numeric values are drawn to scale, on a logarithmic axis if
-    they span at least a factor of ten. The result is None if no values can be compared.
+    the gaps at the best values of the other parameters. If only one parameter varies, and there are
+    two to eight tasks, the panel also shows the gap on each task. :func:`_places_of` says how the
+    values are placed on the axis. The result is None if no values can be compared.
     """
     rows, tasks, values = list_parameters(study), ranked_tasks(study), values_of_parameters(study)
     if not len(rows):
@@ -155,10 +156,12 @@ def _draw_parameters(study: Study) -> Parts | None:
 
 
 def _places_of(values: Sequence[Any]) -> tuple[np.ndarray[Any, Any], bool]:
-    """Return the positions of a parameter's values on an axis, and whether it is logarithmic.
+    """Return the positions of values on an axis, and whether the axis is logarithmic.
 
-    Numeric values are placed to scale, if they are so far apart that the labels do not overlap. All
-    other values are spaced evenly. The positions have shape ``(values,)``.
+    ``values`` are the values of a parameter; numbers must be in ascending order. Numbers are placed
+    to scale, if they are so far apart that the labels do not overlap. The axis is then logarithmic
+    if all numbers are above 0 and span at least a factor of ten. All other values are spaced
+    evenly. The positions have shape ``(values,)``.
     """
     places = np.arange(len(values), dtype=np.float64)
     if not are_numbers(values):
@@ -192,9 +195,10 @@ _FEW: Any = {"markersize": 3, "alpha": 0.6}
 def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
     """Return the gaps of a method's runs if there are too few runs for an interval.
 
-    Gaps are in per cent. ``row`` is the method's row of :func:`.standings`. Each gap is the mean,
-    over tasks, of the gaps of the runs with the same number. The list is empty if there are enough
-    runs for an interval, or if a task has only one run.
+    ``row`` is the row of the method in :func:`.standings`, with the label in ``method``. The list
+    contains a gap for each number of a run, in per cent: the mean over tasks of the gaps of the
+    runs with this number. The list is empty if each task has at least five runs, which are enough
+    for an interval, or if a task has only one run.
     """
     runs = runs_on(study, str(row["method"]), ranked_tasks(study))
     gaps = 100 * runs.groupby("run").gap.mean()
@@ -202,7 +206,7 @@ def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
 
 
 def _draw_gaps(study: Study) -> Parts | None:
-    """Draw the gap of each ranked method, a mean over tasks, with its interval.
+    """Draw the mean gap over tasks of each ranked method, with its interval.
 
     Settings and ablations of methods that are drawn are left out. The result is None if no method
     is ranked.
@@ -277,7 +281,7 @@ def _draw_gaps(study: Study) -> Parts | None:
 
 
 def _width_of(shape: tuple[int, int]) -> float:
-    """Return the usual width (inches) of a figure with these rows and columns of panels."""
+    """Return the usual width (in inches) of a figure, for a shape (rows, columns) of panels."""
     return style.TWO if shape[1] > 1 else style.ONE
 
 
@@ -293,20 +297,20 @@ ALONE = KNOWN_METHODS["corrective-alone/given"].facts.algorithm
     "n = {n} runs.",
 )
 def draw_saved(study: Study) -> Parts | None:
-    """Draw how many more ticks than the corrective process methods take for each goal.
+    """Draw the ticks of methods for each goal, minus those of the corrective process alone.
 
-    The sum over goals is drawn, too. There is a panel for each task, and a row for each of these
-    methods:
+    The sum over goals is drawn, too. There is a panel for each individual task. Of the methods that
+    represent their algorithms (:func:`.headline_methods`), a panel has a row for each of these:
 
     - the learner under the condition that explores most;
     - random search;
-    - the best method that uses the reward of each trial, and the best method that uses the reward
-      as a formula;
+    - the first method, in the order of rows, that uses the reward of each trial, and the first that
+      uses the reward as a formula;
     - methods from files.
 
-    The rows of all panels are in the same order: methods that were run on more tasks come first;
-    methods that were run on equally many tasks are in ascending order of the mean gap. The result
-    is None if there is nothing to draw.
+    The rows of all panels are in the same order: methods with runs on more tasks come first;
+    methods with runs on equally many tasks are in ascending order of the mean gap. The result is
+    None if there is nothing to draw.
     """
     rows, methods = list_saved(study), study.methods
     single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
@@ -378,9 +382,8 @@ def draw_saved(study: Study) -> Parts | None:
 def draw_postures(study: Study) -> Parts | None:
     """Draw the postures of a method at a goal that two tasks share (:func:`.shared_goal`).
 
-    If the study contains runs of random search that control the method
-    (:func:`.contexts_of_control`), a second panel shows the postures of random search. The result
-    is None if there is no shared goal.
+    If the study contains runs of random search to compare with (:func:`.contexts_of_control`), a
+    second panel shows their postures. The result is None if there is no shared goal.
     """
     shared = shared_goal(study)
     if shared is None:
@@ -416,8 +419,8 @@ DOTS = {
     "lean_base": "base\n(share of its way)",
     "lean_joints": "joints\n(share of their way)",
 }
-"""Maps the column of :func:`list_contexts` that each panel of the dot plot shows to the label of
-the panel's axis."""
+"""Maps a column of :func:`list_contexts` to an axis label, for each panel of
+:func:`draw_shared_goal`."""
 
 
 @figure(
@@ -431,10 +434,10 @@ the panel's axis."""
 def draw_shared_goal(study: Study) -> Parts | None:
     """Draw the posture difference and the lean of each method at a shared goal.
 
-    The goal is that of :func:`.shared_goal`. The four panels show the posture difference, the lean,
-    the lean of the base alone, and the lean of the joints alone. A vertical line shows the value of
-    random search, if the study contains runs of random search. Settings and ablations of methods
-    that are drawn are left out. The result is None if there is no shared goal.
+    The goal and the hand are those of :func:`.shared_goal`. The four panels show the posture
+    difference, the lean, the lean of the base alone, and the lean of the joints alone. A vertical
+    line shows the value of random search, if random search has runs at this goal. Settings and
+    ablations of methods that are drawn are left out. The result is None if there is no shared goal.
     """
     shared = shared_goal(study)
     if shared is None:
@@ -472,7 +475,7 @@ def draw_shared_goal(study: Study) -> Parts | None:
 
 
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
-    """Draw the postures of runs at a shared goal, and their mean on each task.
+    """Draw the postures of runs at a shared goal, and the mean posture on each task.
 
     The result is a list with a frame for each task. A frame contains a row for each run, with
     columns ``task``, ``method``, ``goal`` and ``hand``, and a column for each coordinate of the
@@ -525,7 +528,8 @@ def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
 
 
 PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
-"""Maps each cost that has a panel in the figure to the label of the panel's axis."""
+"""Maps a cost (one of :data:`.SPENDS`) to an axis label, for each panel of
+:func:`draw_runtimes`."""
 
 
 @figure(
@@ -538,9 +542,9 @@ PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluati
 def draw_runtimes(study: Study) -> Parts | None:
     """Draw the share of targets that methods reach within a budget.
 
-    Curves are ECDFs of running times (:func:`.runtimes`). In one panel, the budgets are numbers of
-    trials; in the other, they are numbers of forward-kinematics evaluations. A panel without a
-    curve is left out. The result is None if there is no curve.
+    The curves are ECDFs of running times (:func:`.runtimes`). In one panel, the budgets are numbers
+    of trials; in the other panel, the budgets are numbers of forward-kinematics evaluations. A
+    panel without a curve is left out. The result is None if there is no curve.
 
     Curves are drawn for the following methods among those that represent their algorithms
     (:func:`.headline_methods`), without the corrective process alone:
@@ -629,8 +633,8 @@ def draw_runtimes(study: Study) -> Parts | None:
 
 
 CURVES = (*LEARNERS, RANDOM_SEARCH, "hill-climbing", "cma-es/bandit")
-"""Ids of the built-in methods that have learning curves. Methods from files that make trials have
-learning curves, too."""
+"""Ids of the built-in methods that have learning curves. Methods from files have learning curves,
+too, if rewards of their trials are stored."""
 
 
 @figure(
@@ -638,11 +642,11 @@ learning curves, too."""
     "Mean over runs (band: quartiles) of",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
-    """Draw the best reward so far against the trial, in a panel for each task.
+    """Draw the best reward so far against the number of trials, in a panel for each task.
 
-    The curves are those of :func:`learning_curves`. In a world with noise, where the best trial is
-    partly luck, the curves show instead the mean reward of the trials in each tenth of practice
-    (:func:`practice_curves`). The result is None if there is no curve.
+    The curves are those of :func:`learning_curves`. In a world with noise, where the best trial so
+    far is partly luck, the figure shows the curves of :func:`practice_curves` instead. The result
+    is None if there is no curve.
     """
     if study.is_noisy:
         data, shown = practice_curves(study), "mean"
@@ -707,9 +711,9 @@ def learning_curves(study: Study) -> pd.DataFrame:
     """Return the learning curve of each method on each individual task, as means over runs.
 
     A learning curve is the best reward so far as a function of the number of trials. A run is used
-    only if it is solved and the rewards of its trials are stored. A method has a curve if it is one
-    of the methods in :data:`CURVES` or comes from a file, and if :func:`.headline_methods` keeps it
-    among these methods. EC1 has no curve on tasks on which such runs of EC2, EC3 or EC4 exist.
+    only if it is solved and the rewards of its trials are stored. The methods with curves are those
+    that :func:`.headline_methods` selects from the methods in :data:`CURVES` and the methods from
+    files. EC1 has no curve on a task for which EC2, EC3 or EC4 has such runs.
 
     Returns
     -------
@@ -738,11 +742,11 @@ def learning_curves(study: Study) -> pd.DataFrame:
 
 
 def practice_curves(study: Study) -> pd.DataFrame:
-    """Return the mean reward of trials in each tenth of practice, in a noisy world.
+    """Return the mean reward of the trials in each tenth of a run, in a world with noise.
 
-    Methods and tasks are chosen as in :func:`learning_curves`, except that a run is used if it is
-    solved and its entry in column ``practice`` of :attr:`.Study.runs` is not missing. Failed trials
-    are left out of means.
+    Methods and tasks are chosen as in :func:`learning_curves`, but a run is used if it is solved
+    and its entry in column ``practice`` of :attr:`.Study.runs` is not missing. Failed trials are
+    left out of means.
 
     Returns
     -------
@@ -750,7 +754,7 @@ def practice_curves(study: Study) -> pd.DataFrame:
         If there are no curves, the frame is empty and has no columns. Otherwise the columns are
 
         - ``task``, ``method`` (label), and ``runs`` (number of runs);
-        - ``trial``: number of the trial in the middle of each tenth, for the shortest run;
+        - ``trial``: the middle of the tenth, as a number of trials of the shortest run;
         - ``mean``: mean over runs of the mean reward in the tenth, in negative ticks. It is NaN if
           a run completed no trial in this tenth;
         - ``mean_low`` and ``mean_high``: lower and upper quartile over runs.
@@ -769,10 +773,10 @@ def practice_curves(study: Study) -> pd.DataFrame:
 def _runs_with_curves(
     study: Study, run_ids: Collection[str]
 ) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """Yield the task, the method's label, and the solved runs of each learning curve.
+    """Yield the name of the task, the label of the method, and the runs of each learning curve.
 
-    Only runs whose ids are in ``run_ids`` are used. :func:`learning_curves` says which methods have
-    a curve.
+    Only solved runs whose ids are in ``run_ids`` are used. :func:`learning_curves` says which
+    methods have a curve.
     """
     cells = {
         (task, label): runs
@@ -795,10 +799,11 @@ def _runs_with_curves(
     "runs), for methods that solved every run.",
 )
 def draw_gaps_by_family(study: Study) -> Parts | None:
-    """Draw the gap to the best known reward of each instance, by family and method.
+    """Draw the gaps to the best known rewards of instances, for each family and method.
 
     There is a panel for each family, and a row for each method. A dot is the mean over runs on an
-    instance on which all runs of the method are solved. Settings and ablations of methods that are
+    instance on which all runs of the method are solved. A diamond is the mean over the instances of
+    the family, if all runs on all of them are solved. Settings and ablations of methods that are
     drawn are left out. The result is None if there is nothing to draw.
     """
     runs, rows = instance_runs(study), study.methods
@@ -863,7 +868,7 @@ _DISC_LOOK: Any = {
     "close goals are moved apart. A goal that is larger than its disc is a circle around it.",
 )
 def draw_tasks(study: Study) -> Parts | None:
-    """Draw the start configuration and the goals of each individual task, a panel for each.
+    """Draw the start configuration and the goals of each individual task, in a panel each.
 
     The result is None if the study has no individual tasks.
     """
@@ -887,7 +892,7 @@ def draw_tasks(study: Study) -> Parts | None:
 
 @style.styled
 def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
-    """Return a figure of tasks: the start configuration and the goals of each."""
+    """Return a figure with a panel for each task: its start configuration and its goals."""
     tasks = titled_apart(tasks)
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))

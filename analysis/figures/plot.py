@@ -57,7 +57,7 @@ class Plot:
     """Alternative text: a description for people who cannot see the figure."""
     figure: Figure
     data: pd.DataFrame
-    """The numbers that the figure shows, as a tidy frame."""
+    """The numbers that the figure shows."""
 
     def save(self, path: str | Path) -> None:
         """Write the figure into a file, which is replaced if it exists.
@@ -83,15 +83,17 @@ class Plot:
 
 
 Parts = tuple[Figure, pd.DataFrame, str, str]
-"""What a drawing function returns: the figure, its numbers, its alternative text, and sentences
-that depend on the study and are added at the end of the caption."""
+"""Result of a drawing function: the figure, its numbers, its alternative text, and text that is
+added at the end of the caption."""
 DrawsFigure = Callable[..., Plot | None]
 """Function that draws a figure of the report.
 
 Its argument is a study of one world. It returns a :class:`Plot`, or None if the study has no runs
-for this figure. Optional arguments are ``width``, the width of the figure in inches, such as 3.4,
-5.5 or 7.2; and ``style``, settings of Matplotlib that override those of the project, in any form
-that ``matplotlib.style.use`` accepts.
+for this figure. There are two optional arguments:
+
+- ``width``: width of the figure in inches, such as 3.4, 5.5 or 7.2;
+- ``style``: settings of Matplotlib that override those of the project. It is a dict, the name of a
+  style of Matplotlib, or the path of a style file.
 """
 
 
@@ -103,15 +105,15 @@ FIGURES: dict[str, DrawsFigure] = {}
 def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:
     """Return a decorator that makes a figure of the report from a drawing function.
 
-    The decorator adds the function to :data:`FIGURES`. The figure has
+    The decorator adds the decorated function to :data:`FIGURES`, with the id of the figure as the
+    key: the name of the drawing function after its first underscore, with dashes instead of
+    underscores. The decorated function returns a :class:`Plot` with
 
-    - the style of all figures;
-    - an id: the name of the drawing function after its first underscore, with dashes instead of
-      underscores. In another world than the paper's, the suffix of the world follows
-      (:func:`.ending_of`);
-    - a title, followed by the name of the world if it is not the paper's;
-    - a caption, followed by the sentences that the drawing function returns, and by an explanation
-      of the dagger if the figure has one.
+    - a figure in the style of all figures;
+    - the id, followed by the suffix of the world (:func:`.ending_of`);
+    - the title, followed by the name of the world if it is not the paper's;
+    - the caption, followed by the text that the drawing function returns. If the figure has a
+      dagger, a sentence that explains the dagger follows.
 
     Parameters
     ----------
@@ -119,8 +121,9 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
         Title of the figure.
     caption : str
         Beginning of the caption. ``{n}`` stands for the smallest and the largest number in column
-        ``runs`` of the figure's numbers (empty if there is no such column), and ``{reference}`` for
-        the name of the rewards from which gaps are measured (:func:`.reference`).
+        ``runs`` of the figure's numbers, such as ``20 to 50``, or for one number if they are equal.
+        It is empty if there is no such column. ``{reference}`` stands for the name of the rewards
+        from which gaps are measured (:func:`.reference`).
     """
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:
@@ -152,9 +155,9 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
 def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     """Return a dict that maps each label to the look of its line and markers.
 
-    A look is a dict of arguments of Matplotlib's ``plot``. A method has the same look in all
-    figures of a study. Methods from files have wider lines and larger markers than built-in
-    methods.
+    A look is a dict of arguments of Matplotlib's ``plot``. The colour and the marker of a method
+    are those in column ``style`` of :attr:`.Study.methods`. Methods from files have wider lines and
+    larger markers than built-in methods.
     """
     looks: dict[str, style.Look] = {}
     for label, row in study.methods.loc[[*labels]].iterrows():
@@ -169,10 +172,10 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
 
 
 def looks_by_kind(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
-    """Return the looks of methods in figures with a row for each method, by label.
+    """Return a dict that maps each label to a look, for figures with a row for each method.
 
-    Colour and marker say how a method uses the reward (:data:`.KINDS`). Methods from a user's
-    method file keep the looks of :func:`looks_in`.
+    Colour and marker of a built-in method say how the method uses the reward (:data:`.KINDS`).
+    Methods from files have the looks of :func:`looks_in`.
     """
     looks = looks_in(study, labels)
     for label, look in looks.items():
@@ -186,7 +189,8 @@ def looks_by_kind(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
 def describe_kinds(study: Study, labels: Iterable[str], *, with_marks: bool = False) -> str:
     """Return a sentence for a caption that says what the colours of :func:`looks_by_kind` mean.
 
-    If ``with_marks`` is True, the sentence also names the markers.
+    If ``with_marks`` is True, the sentence also names the markers. The result is the empty string
+    unless the built-in methods in ``labels`` use the reward in at least two ways.
     """
     rows = study.methods.loc[[*labels]]
     kinds = {*rows.information[rows.built_in.astype(bool)]}
@@ -198,12 +202,13 @@ def describe_kinds(study: Study, labels: Iterable[str], *, with_marks: bool = Fa
 
 
 def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -> str:
-    """Return the name of a method (a label) for the figure that is being drawn.
+    """Return the name of a method for the figure that is being drawn.
 
-    The name is the title of the method, or its short title in a narrow figure. It is broken into
-    lines of at most ``longest`` characters, or 24 characters in a narrow figure. In a study that
-    varies parameters, the name consists of the values of the parameters, because all settings
-    belong to the same method; for the default setting, :func:`.default_name` follows.
+    ``method`` is a label. The name is the title of the method, or its short title in a narrow
+    figure. The name is broken into lines of at most ``longest`` characters, or 24 characters in a
+    narrow figure. In a study that varies parameters, all settings belong to the same method. The
+    name then consists of the values of the parameters, followed by :func:`.default_name` for the
+    default setting.
     """
     if method in study.varied.index:
         row = study.methods.loc[method]
@@ -223,9 +228,9 @@ def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
     """Describe the rows of a frame in words, for an alternative text.
 
-    The template is filled in for each row, and the results are joined by semicolons. A name in
-    braces stands for the value of this column; ``{title}`` stands for the title of the method whose
-    label is in column ``method``.
+    The template is filled in for each row (``str.format``), and the results are joined by
+    semicolons. The name of a column in braces stands for the value in this column. ``{title}``
+    stands for the title of the method whose label is in column ``method``.
     """
     rows = rows.assign(title=rows.method.map(study.methods.title))
     return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
@@ -234,8 +239,9 @@ def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
 def picture(drawing: Figure, ending: str) -> bytes:
     """Return a figure as the bytes of a picture file.
 
-    The same figure gives the same bytes with the same fonts and the same version of Matplotlib: ids
-    in SVG are not random, and no date is written. SVG and PDF files name the version of Matplotlib.
+    With the same fonts and the same version of Matplotlib, the same figure gives the same bytes:
+    ids in SVG are not random, and no date is written. SVG and PDF files name the version of
+    Matplotlib.
 
     Parameters
     ----------
@@ -263,10 +269,11 @@ def picture(drawing: Figure, ending: str) -> bytes:
 
 
 def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
-    """Return a figure as the bytes of a file, without changing its layout engine.
+    """Return a figure as the bytes of a file.
 
     ``settings`` are rcParams of Matplotlib, and ``how`` are arguments of ``Figure.savefig``. The
-    layout engine arranges the parts of the figure once, before the figure is written.
+    layout engine of the figure arranges its parts once, before the figure is written. The figure
+    has the same layout engine afterwards.
     """
     stream, layout, dpi = io.BytesIO(), drawing.get_layout_engine(), drawing.dpi
     canvas = drawing.canvas
@@ -290,9 +297,9 @@ def for_page(plot: Plot) -> str:
     - Black is replaced by the page's ``currentColor``, so that a dark page can have light ink.
     - Other colours are custom properties of CSS, which the page can define: ``--paper`` for the
       inside of open markers, ``--grey``, ``--blue``, and the names of the colours of methods.
-    - A mark with a :func:`~.style.tip` shows the text of the tip.
+    - A mark with a :func:`~.style.tip` shows the text of the tip when the pointer rests on it.
     - All ids begin with the id of the plot, so that a page can have several figures. The id of the
-      whole drawing ends in ``-drawing``.
+      element with the whole drawing is the id of the plot followed by ``-drawing``.
     - Each ``style`` attribute is replaced by a class, whose name is a hash of the style.
     """
 
@@ -338,7 +345,7 @@ def for_page(plot: Plot) -> str:
 
 
 def _with_short_lines(path: str) -> str:
-    """Return an SVG path with relative instead of absolute coordinates of its lines.
+    """Return an SVG path in which lines have relative instead of absolute coordinates.
 
     The coordinates of the path must have at most one decimal.
 
@@ -358,11 +365,11 @@ def _with_short_lines(path: str) -> str:
 
 
 def panels_for_page(plot: Plot) -> list[str]:
-    """Return each panel and legend of a figure as ``<svg>``, for a narrow page.
+    """Return an ``<svg>`` element for each panel and each legend of a figure, for a narrow page.
 
-    The elements refer to parts of the element that :func:`for_page` returns. Call that function
-    first, and put its element on the same page. The list is empty if the figure has only one panel,
-    or if a panel with axes has no labels on its y axis, because it shares those of another panel.
+    The elements refer to the element that :func:`for_page` returns. Call :func:`for_page` first,
+    and put its element on the same page. The list is empty if the figure has only one panel. It is
+    also empty if a panel has no labels on its y axis because it shares those of another panel.
     """
     drawing, canvas = plot.figure, plot.figure.canvas
     panels = [axes for axes in drawing.axes if axes.has_data()]

@@ -1,7 +1,7 @@
 """Define the style of all figures: sizes, colours and markers.
 
-Colours are those of Okabe & Ito (2008), Color Universal Design, without the yellow. Methods have
-their own colours (:data:`.COLORS`), markers and dashes.
+The colours of ``PALETTE`` are those of Okabe & Ito (2008), Color Universal Design, without black
+and yellow. Methods have their own colours (:data:`.COLORS`), markers and dashes.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Settings of Matplotlib (rcParams) for all figures."""
 MIN_PANEL, MIN_SMALL_PANEL, MIN_DOTS = 2.2, 1.6, 0.8
-"""Smallest widths, in inches, of panels that are side by side in a figure whose width is set. They
-are for panels with names to their left, for panels without names, and for the panels of a dot plot,
-which share the names of rows."""
+"""Smallest widths, in inches, of panels that are side by side in a figure whose width is set
+(:func:`drawn_at`): of panels with names to their left, of panels without such names, and of the
+panels of a dot plot, which share the names of their rows."""
 _width: ContextVar[float | None] = ContextVar("width", default=None)
 COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
-"""Coverage of all intervals, for captions."""
+"""Coverage of the confidence intervals, for captions."""
 BACKGROUND = "#ffffff"
 TIP = "tip:"
-"""Prefix of the id of a mark that has a :func:`tip`."""
+"""Prefix of the group id (gid) of a mark that has a :func:`tip`."""
 BLUE, SKY, GREEN, ORANGE = "#0072b2", "#56b4e9", "#009e73", "#e69f00"
 VERMILLION, PURPLE, GREY, INK = COLORS["rust"], "#cc79a7", "#6b6b6b", COLORS["ink"]
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
@@ -56,8 +56,8 @@ INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": (0, (5, 1.2, 1, 1.
 """Looks of the line at the best known reward, and of the line at the reward of the corrective
 process alone: arguments of Matplotlib."""
 styled = style.context(["default", RC])
-"""Decorator of a drawing function: it applies this style, and Matplotlib's defaults instead of the
-user's settings."""
+"""Decorator of a drawing function. The function then draws with Matplotlib's defaults and the
+settings :data:`RC`, whatever the settings of the user are."""
 
 
 Look = dict[str, Any]
@@ -70,8 +70,8 @@ def look_of(method: str) -> Look:
     Parameters
     ----------
     method : str
-        Id of a built-in method, such as ``"cma-es/bandit"``. Of the methods that share an
-        algorithm, only the one that figures show for this algorithm has a look.
+        Id of a built-in method, such as ``"cma-es/bandit"``. Only the methods that represent their
+        algorithms (column ``headline`` of :attr:`.Study.methods`) have a look.
 
     Returns
     -------
@@ -94,9 +94,10 @@ def look_of(method: str) -> Look:
 
 
 def grid(panels: int) -> tuple[int, int]:
-    """Return the numbers of rows and columns in which a number of panels is arranged.
+    """Return the numbers of rows and columns in which panels are arranged.
 
-    A single panel has one column, two to six panels have two columns, and more have three.
+    ``panels`` is the number of panels. A single panel has one column, two to six panels have two
+    columns, and more panels have three columns.
     """
     columns = min(2 if panels <= 6 else 3, panels)
     return -(-panels // columns), columns
@@ -129,9 +130,9 @@ def panels(
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with panels.
 
-    If :func:`drawn_at` has set a width, the figure has this width. If panels would then be narrower
-    than ``least``, there are fewer columns and more rows of panels, and the height of the figure
-    grows in proportion to the number of rows.
+    If :func:`drawn_at` has set a width, the figure has this width. If the panels would then be
+    narrower than ``least``, they are arranged in fewer columns and more rows. The height of the
+    figure grows in proportion to the number of rows.
 
     Parameters
     ----------
@@ -141,8 +142,7 @@ def panels(
         Width and height, in inches. ``ONE`` and ``TWO`` are the widths of one and two columns of a
         journal.
     used : int, optional
-        Number of panels that are used, by default all. The other panels are not drawn. If a width
-        is set, only the last row has unused panels.
+        Number of panels that are used, by default all. The other panels are not drawn.
     least : float
         Smallest width (in inches) of panels side by side, if a width is set.
     **subplots
@@ -183,7 +183,8 @@ def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any)
     handles : sequence of matplotlib.artist.Artist
         Entries of the legend: artists with labels.
     columns : int
-        Number of columns of the legend. It is reduced if the figure is too narrow for the labels.
+        Number of columns of the legend. If the figure is too narrow for the labels, there are
+        fewer columns.
     **more
         Arguments of Matplotlib's ``Figure.legend``.
     """
@@ -228,8 +229,9 @@ def means(
         Names of the columns with the x coordinates and with the means.
     by : str
         Name of the column that says to which group a row belongs. Each group is drawn as a line
-        with a colour and a label of its own; a row with NaN in this column is not drawn. If ``by``
-        is empty, all rows belong to one line.
+        with a label of its own; a row with NaN in this column is not drawn. The lines have the
+        colours of ``PALETTE`` in turn. If ``by`` is empty, all rows belong to one line without a
+        label.
     scale : float
         Factor by which means and intervals are multiplied: 100 turns a fraction into per cent.
     shift : float
@@ -237,12 +239,12 @@ def means(
     bars : float, optional
         Line width of the intervals, in points; None for Matplotlib's line width.
     **line
-        Look of the line and its markers: arguments of Matplotlib's ``plot``.
+        Look of the lines and their markers: arguments of Matplotlib's ``plot``.
 
     Raises
     ------
     CoarticError
-        The frame has no rows, a column is missing, or a value is not a finite number.
+        The frame has no rows, a column is missing, or a value is neither a finite number nor NaN.
     """
     ends = [f"{y}_low", f"{y}_high"] if f"{y}_low" in getattr(frame, "columns", ()) else []
     checked(frame, numbers=[x, y, *ends], others=[by] * bool(by))
@@ -273,15 +275,15 @@ def dots(
         A row for each row of the plot, from top to bottom, with the columns
 
         - ``name``: name that is written to the left of the row;
-        - ``color`` and ``marker``: of Matplotlib;
+        - ``color`` and ``marker``: colour and marker in the form that Matplotlib accepts;
         - ``bold``: True to write the name in bold type;
-        - a column for each quantity, and columns with the same name and ``_low`` and ``_high`` if
-          the quantity has intervals. NaN stands for a missing dot or interval.
+        - a column for each quantity. If the quantity has intervals, their ends are in columns whose
+          names have the endings ``_low`` and ``_high``. NaN stands for a missing dot or interval.
     quantities : mapping of str to str
         Maps the column of each quantity to the label of the axis of its panel.
     lines : mapping of str to float or sequence of float
-        Maps columns of quantities to the values at which their panels have dashed lines. NaN, and
-        names that are not in ``quantities``, are ignored.
+        Maps columns of quantities to the values at which their panels have dashed vertical lines.
+        NaN, and names that are not in ``quantities``, are ignored.
 
     Returns
     -------
@@ -341,10 +343,10 @@ def log_axis(axes: Axes) -> None:
 
 
 def letters(panels: Iterable[Axes], pad: float | None = None) -> None:
-    """Write the letters a, b, ... z before the titles of panels.
+    """Write the letters a, b, ... z before the left-aligned titles of panels.
 
-    ``pad`` is the distance of the titles from the axes, in points. Panels after the 26th get no
-    letter.
+    ``pad`` is the distance of the titles from the axes, in points; None stands for Matplotlib's
+    setting. Panels after the 26th get no letter.
     """
     for letter, axes in zip(ascii_lowercase, panels, strict=False):
         axes.set_title(f"{letter}  {axes.get_title(loc='left')}", loc="left", pad=pad)

@@ -42,7 +42,7 @@ from coartic.tasks.task import shipped_tasks
 
 HERE = Path(__file__).parent
 LONG = 10
-"""Largest number of rows of a table that the page does not fold. The ranking is never folded."""
+"""Largest number of rows of a table that the page does not fold (:attr:`.Section.unfolded`)."""
 
 
 def write_report(
@@ -55,13 +55,13 @@ def write_report(
 ) -> tuple[list[str], dict[str, str]]:
     """Write a report into a folder, and replace an earlier report of the same results.
 
-    The page ``report.html`` and all tables as CSV files are always written. If the study has
-    several worlds,
+    The page ``report.html`` and a CSV file for each table with rows are always written. If the
+    study has several worlds,
 
-    - the page shows the first world, and a section for each other world;
+    - the page shows the sections of the first world, and a section for each other world;
     - a CSV file has the rows of all worlds, with a column ``world``;
     - a LaTeX file has a table for each world, because headings and best known rewards differ;
-    - the name of a figure's file ends in the name of its world.
+    - the name of a figure's file ends in the suffix of its world (:func:`.ending_of`).
 
     Parameters
     ----------
@@ -72,8 +72,8 @@ def write_report(
     for_paper : bool
         True to also write tables as LaTeX, and figures as SVG and PDF.
     width : float, optional
-        Width of the SVG and PDF figures, in inches. By default each figure has the width that it
-        has in ``report.html``.
+        Width of the SVG and PDF figures, in inches. By default each figure has its usual width: one
+        or two columns of a journal.
     watch : callable
         Function for showing the progress. It is called with the title of each section before the
         section is made, and with ``TITLE, for print`` before the figures of the section are made
@@ -89,6 +89,7 @@ def write_report(
     Raises
     ------
     CoarticError
+        - ``folder`` cannot be written, or another process is writing a report into it.
         - ``folder`` contains the results themselves.
         - ``folder`` already has a report of other results. (If ``folder`` is inside the results
           folder, this is not checked.)
@@ -146,9 +147,9 @@ def write_report(
 
 
 def _latex_of(study: Study, table: Table) -> str:
-    """Return a table as LaTeX; the empty string if no column is for LaTeX.
+    """Return a table of a study of one world as LaTeX.
 
-    The study must have one world.
+    The result is the empty string if LaTeX has no column of the table.
     """
     if not any(column.in_latex for column in table.columns):
         return ""
@@ -173,8 +174,8 @@ def _files_of_figures(study: Study, section: Section, width: float | None) -> di
 def _rows_shown(study: Study, table: Table) -> pd.DataFrame:
     """Return the rows of a table that page and LaTeX show.
 
-    Settings and ablations of other methods in the table (:func:`.is_setting`) are left out, unless
-    ``table.with_settings`` is True.
+    Rows about settings and ablations of other methods in the table (:func:`.is_setting`) are left
+    out, unless ``table.with_settings`` is True.
     """
     frame = table(study)
     return frame if table.with_settings else frame[~is_setting(study, frame)]
@@ -186,14 +187,15 @@ def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str
     ``first`` contains the figures at the top of the page, which the section does not repeat. The
     keys of the dict are
 
-    - ``finding``: the finding as a list of lines;
-    - ``first_lines``: how many of these lines the page shows on its first screen;
+    - ``finding``: the finding as a list of lines (:func:`.finding`);
+    - ``first_lines``: the number of these lines that are at the top of the page instead of in the
+      section: all lines for the ranking of a study that varies parameters, otherwise one;
     - ``figures``: a tuple for each figure: the plot, its SVG, and the SVGs of its panels for phones
       (:func:`.panels_for_page`);
-    - ``shown``: a dict for each table that has rows, with its ``id``, the name of its ``file``, its
-      ``caption``, its number of ``rows``, its ``html``, whether it is ``folded`` on the page, and
-      whether it ``is_printed``. The ranking is never folded. The table of methods that are not
-      ranked is always folded, and is not printed.
+    - ``shown``: a dict for each table that has rows, with its ``id``, the name of its ``file``
+      without suffix, its ``caption``, its number of ``rows``, its ``html``, whether it is
+      ``folded`` on the page (:attr:`.Section.unfolded`), and whether it ``is_printed``. All tables
+      are printed, except the table of methods that are not ranked.
     """
     drawn = {plot.id for plot in first}
     draws = [draw for draw in section.figures if id_of(draw) + ending_of(study) not in drawn]
@@ -230,11 +232,14 @@ def stamp(runs: pd.DataFrame) -> str:
 def _first_figures(study: Study) -> list[Plot]:
     """Return the figures at the top of the page, one journal column wide.
 
-    The first figure is the ranking. If the study does not vary parameters, there is a second:
+    The first figure is the ranking. If the study does not vary parameters, there is a second
+    figure:
 
-    - the figure of postures at a goal that two tasks share, by method (:func:`.draw_shared_goal`),
-      if all individual tasks are shipped with coartic;
-    - otherwise, or if there is no such goal, the figure of the tasks.
+    - the figure of the postures at a goal that two tasks share (:func:`.draw_shared_goal`), if all
+      individual tasks are tasks of the paper, and there is such a goal;
+    - otherwise the figure of the tasks.
+
+    A figure for which the study has no runs or tasks is left out.
     """
     draws = [draw_tasks]
     if study.individual_tasks.keys() <= shipped_tasks().keys():
@@ -245,7 +250,10 @@ def _first_figures(study: Study) -> list[Plot]:
 
 
 def _heading_of(study: Study) -> str:
-    """Return a heading that names up to three tasks, or otherwise the suite."""
+    """Return a heading for the page.
+
+    The heading names the tasks if there are at most three, otherwise the suite.
+    """
     tasks = [marked(task) for task in study.tasks.values()]
     subject = listed(tasks) if len(tasks) <= 3 else f"suite {study.suite}"
     return f"Coarticulation of a simulated robot: {subject}"
@@ -260,9 +268,10 @@ def _sections_shown(
 ) -> list[dict[str, Any]]:
     """Return a dict for each section of a world, for the page's template.
 
-    Sections without figures, tables and errors are left out. ``first`` contains the figures at the
-    top of the page (:func:`_parts_of`). If a section cannot be made, its title and the error are
-    added to ``failures``. ``watch`` is called with the title of each section before it is made.
+    A section is left out if it has no figure, no table and no error. ``first`` contains the figures
+    at the top of the page, which no section repeats. If a section cannot be made, its title and the
+    error are added to ``failures``. ``watch`` is called with the title of each section before the
+    section is made.
     """
     shown = []
     for section in of_page:
@@ -283,7 +292,7 @@ def _page(
     first: Sequence[Plot],
     failures: dict[str, str],
 ) -> str:
-    """Return the page as HTML that needs no other file and no network.
+    """Return the page as HTML, which needs neither other files nor a network.
 
     Parameters
     ----------
@@ -296,7 +305,8 @@ def _page(
     first : sequence of Plot
         The figures at the top of the page.
     failures : dict of str to str
-        Maps the name of each part that could not be made to its error.
+        Maps the name of each part that could not be made to its error. If the interactive figure
+        cannot be made, its error is added.
     """
     main = next(iter(study.worlds.values()))
     environment = Environment(

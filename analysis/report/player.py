@@ -18,23 +18,25 @@ from coartic.robot import HANDS
 def player(study: Study) -> str:
     """Return the interactive figure with the runs of a study as HTML.
 
-    A preset is a task, with a run of each method, that the user can choose in the figure:
+    The user chooses a preset and a method in the figure. A preset consists of a task, or of two
+    tasks, and a run of each method on each of its tasks. The presets are, in this order:
 
-    - Each individual task is a preset if a method whose movements are straight solved it. For each
-      of these methods, the preset has the run whose reward is nearest to the median.
-    - If the goal of :func:`.shared_goal` is goal 1, and a method whose movements are straight
-      solved both tasks, the two tasks together are the first preset. This preset also has the
-      posture difference of random search, if there is random search that is the control.
+    - the two tasks of :func:`.shared_goal` together, if they share goal 1, and a method whose
+      movements are straight solved both. This preset also has the posture difference of random
+      search, if the study has such runs of random search (:func:`.contexts_of_control`);
+    - each individual task that a method whose movements are straight solved.
 
-    The result is the empty string if there is no preset, and in another world than the paper's,
-    because the script of the figure only knows the paper's model.
+    For each of these methods, a preset has the run whose reward is nearest to the median. The
+    result is the empty string if there is no preset. It is also empty in another world than the
+    paper's, because the script of the figure only knows the paper's model.
 
     The method that the figure shows first is
 
     - the first method from a file, in the order of :func:`.standings`, that is in a preset;
-    - otherwise the method of :func:`.shared_goal`, if it is in the first preset;
+    - otherwise the method of :func:`.shared_goal`, if the shared goal is goal 1, and the method is
+      in the first preset;
     - otherwise the paper's learner (EC1 if the first preset has one arm, EC4 if it has two), if it
-      is in the first preset. The page of ``coartic play`` begins with it, too;
+      is in the first preset. The page of ``coartic play`` begins with this learner, too;
     - otherwise the first method of the first preset.
     """
     presets, first = [], ""
@@ -84,7 +86,7 @@ def player(study: Study) -> str:
 
 
 def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
-    """Yield the table cells that show a gap on a task, with their runs.
+    """Yield the table cells that show the gap of a method on a task.
 
     Each item consists of the id of the HTML cell, the name of the task, and the label of the
     method. The cells are those of the table of ranked methods and of the table of methods that are
@@ -102,15 +104,16 @@ def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
 
 
 def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
-    """Return the methods that solved all given tasks, in the form that ``model.js`` reads.
+    """Return the methods that solved a run on each given task, in the form that ``model.js`` reads.
 
     Each method is a dict with the keys
 
     - ``id``: label of the method;
     - ``name``: title of the method;
     - ``films``: a list with a film for each task (:func:`_film_of`). If there is more than one
-      task, a film also has ``reached``: the postures of the first 500 solved runs at goal 1, which
-      the tasks share, in length units and rad.
+      task, a film also has the key ``reached``: the postures of the first 500 solved runs at goal
+      1, which the tasks share, as lists of numbers in length units and rad, rounded to three
+      decimals.
 
     Methods with movements of kind ``path`` are left out, because the script only makes straight
     movements.
@@ -127,14 +130,14 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
 
 
 def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
-    """Return the run of a cell that is nearest to the median, for ``model.js``.
+    """Return the run of a cell whose reward is nearest to the median, for ``model.js``.
 
-    The run is one of the first 500 solved runs. The film is a dict with the keys
+    The run is chosen from the first 500 solved runs. The result is a dict with the keys
 
-    - ``run``: the first characters of the id of the run;
-    - ``ticks``: ticks of the whole run;
-    - ``movements``: a dict for each movement, with ``goal`` (from 0), ``hand`` (index in HANDS),
-      ``kind`` and ``target`` (length units and rad).
+    - ``run``: the first eight characters of the id of the run;
+    - ``ticks``: ticks of the solution;
+    - ``movements``: a list with a dict for each movement. Its keys are ``goal`` (from 0), ``hand``
+      (index in HANDS), ``kind`` and ``target`` (a list in length units and rad, or None).
 
     The dict is empty if the cell has no solved run, or if a movement of one of the first 500 solved
     runs is of kind ``path``.

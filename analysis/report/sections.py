@@ -1,4 +1,4 @@
-"""Define the sections of the page: their tables, their figures and their finding in words.
+"""Define the sections of the page: their tables, their figures and their findings in words.
 
 The module also collects facts that limit the conclusions from a study (:func:`limits`).
 """
@@ -97,14 +97,14 @@ IN_NOISE = (
     "execution without noise. Running times are not shown, because the reward of a single trial is "
     "partly luck."
 )
-"""Note on the page that says what is different in a world with motor noise."""
+"""Note on the page on what is different in a world with motor noise."""
 
 
 @dataclass(frozen=True)
 class Section:
     """A section of the page: its tables, its figures and its finding in words.
 
-    The page leaves a section out if no table has rows and no figure can be drawn.
+    The page leaves a section out if it has no error, no table with rows, and no figure.
     """
 
     id: str
@@ -115,22 +115,30 @@ class Section:
     """Functions that draw the figures. A function returns None if the study has no runs for its
     figure. The page folds all figures except the first."""
     sentence: str = ""
-    """Jinja template of the finding in words; empty if the section has no finding. It can use
+    """Jinja template of the finding in words; empty if the section has no finding. The template can
+    use
 
     - ``rows``: the first table of the section, without settings and ablations, with further
       columns: ``title`` and ``information`` of each method, its name as the ``subject`` of a
       sentence (:func:`.subject_of`), and ``own`` (True for a method from a file);
-    - ``others``: a list of the other tables of the section, with the same further columns;
+    - ``others``: a list of the other tables of the section except :func:`.list_parameters`, with
+      the same further columns;
     - further names that :func:`.finding` defines.
     """
     note: str = ""
-    """Text that explains the figures and tables of the section."""
+    """Text that explains the figures and tables of the section. ``{reference}`` stands for the name
+    of the best known rewards (:func:`.reference`)."""
     single: bool = True
-    """True for a section about individual tasks. It is left out for a study without individual
-    tasks (:attr:`.Study.individual_tasks`)."""
+    """True for a section about individual tasks. The section is left out for a study without
+    individual tasks (:attr:`.Study.individual_tasks`)."""
     unfolded: tuple[Table, ...] = ()
-    """Tables whose numbers no figure shows. The page folds them only if they are long, and folds
-    all other tables. If the section has figures, but none can be drawn, no table is folded."""
+    """Tables whose numbers no figure shows. The page folds a table of ``unfolded`` only if it has
+    more than ten rows, and folds all other tables. There are three exceptions:
+
+    - If the section has figures, but none can be drawn, no table is folded.
+    - The ranking is never folded.
+    - The table of methods that are not ranked is always folded.
+    """
 
 
 SECTIONS = (
@@ -295,7 +303,7 @@ ascending=[true, false]) %}
 
 
 def section_of_world(study: Study) -> Section:
-    """Return the section of the page for a further world of a folder.
+    """Return the section of the page for a world that is not the first world of a folder.
 
     ``study`` is the study of this world.
     """
@@ -321,8 +329,8 @@ def shown(text: str) -> str:
 def visible_sections(study: Study) -> list[Section]:
     """Return the sections of the page for a study.
 
-    Sections about individual tasks are left out if the study has no individual tasks, but only many
-    random tasks.
+    Sections about individual tasks (:attr:`Section.single`) are left out if the study has no
+    individual tasks.
     """
     return [section for section in SECTIONS if study.individual_tasks or not section.single]
 
@@ -330,11 +338,11 @@ def visible_sections(study: Study) -> list[Section]:
 def attempt(
     failures: dict[str, str], name: str, make: Callable[..., Made], *args: Any
 ) -> Made | None:
-    """Return a part of a report, or None if it cannot be made.
+    """Call ``make(*args)``, and return its result, or None if it raises an exception.
 
-    If ``make(*args)`` raises an exception, the error with its file and line is stored in
-    ``failures`` with the key ``name``, the name of the part, unless this part has an error already.
-    A CoarticError is not caught.
+    The result is a part of a report, and ``name`` is the name of this part. The exception, with its
+    file and line, is stored in ``failures`` with the key ``name``, unless there is an entry with
+    this key already. A CoarticError is not caught.
     """
     try:
         return make(*args)
@@ -351,9 +359,10 @@ def finding(study: Study, section: Section) -> list[str]:
     """Return the finding of a section in words, as a list of lines.
 
     The lines are made from the tables of the section by its template :attr:`Section.sentence`. For
-    the ranking of a study that varies parameters, the lines are those of
-    :func:`.answer_on_parameters` instead. The list is empty if the section has no template, or if
-    its first table has no rows; if this table is the ranking, a line says that no method is ranked.
+    the ranking of a study that varies parameters (:func:`varies_parameters`), the lines are those
+    of :func:`.answer_on_parameters` instead. The list is empty if the section has no template, or
+    if its first table has no rows. If the first table is the ranking and has no rows, the only line
+    says that no method is ranked.
     """
     is_ranking = section.tables[0] is list_ranking
     if not section.sentence or not len(section.tables[0](study)):
@@ -365,7 +374,7 @@ def finding(study: Study, section: Section) -> list[str]:
     subjects = methods.apply(subject_of, axis=1)
 
     def few(row: Mapping[str, Any]) -> str:
-        """Return a remark if a stochastic method has too few runs, otherwise ""."""
+        """Return a remark if a stochastic method has too few runs for a test, otherwise ""."""
         labels = str(row["method"]), str(row["against"])
         return TOO_FEW * has_few_runs(study, labels, solved_tasks(study, labels[1]))
 
@@ -391,7 +400,7 @@ def finding(study: Study, section: Section) -> list[str]:
 
 
 def varies_parameters(study: Study) -> bool:
-    """Return True if a study varies parameters and compares with no single method."""
+    """Return True if a study varies parameters, and :attr:`.Study.against` is empty."""
     return not (study.varied.empty or study.against)
 
 
@@ -404,10 +413,11 @@ def _template_of(sentence: str) -> Template:
 
 
 def _beside(row: Mapping[str, Any], is_first: bool) -> str:
-    """Return in words how much better or worse than another method a method is.
+    """Return in words by how much the reference method is ahead of or behind another method.
 
-    ``row`` is a row of table ``differences``. An example of a result is ``5.0 [4.2, 5.9] points
-    behind CMA-ES``. If several results are listed, only the first (``is_first``) names the unit.
+    ``row`` is a row of table ``differences`` with the additional column ``subject``: the name of
+    the other method. An example of a result is ``5.0 [4.2, 5.9] points behind CMA-ES``. If several
+    results are listed, only the first (``is_first``) names the unit.
     """
     other = str(row["subject"]).removesuffix(",")
     if row["difference"] == 0:
@@ -422,17 +432,17 @@ def _beside(row: Mapping[str, Any], is_first: bool) -> str:
 def _first_two(rows: pd.DataFrame) -> list[dict[Any, Any]]:
     """Return the first two rows of a table as dicts.
 
-    It replaces :func:`leading` in a study that varies parameters, whose rows are all settings of
-    the same method.
+    This function replaces :func:`leading` in a study that varies parameters, where all rows are
+    settings of the same method.
     """
     return rows[:2].to_dict("records")
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the rows of a table that a finding mentions, as dicts in order.
+    """Return the rows of a table that a finding mentions, as dicts, in the order of the table.
 
-    These are all rows of the methods in the first two rows, of the paper's learner, of random
-    search, and of methods from files.
+    These are all rows of the methods in the first two rows, of the paper's learner (EC1, EC4, or
+    both together), of random search, and of methods from files.
     """
     always = [joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH]
     is_shown = rows.method.isin([*rows.method[:2], *always]) | rows.own
@@ -441,28 +451,30 @@ def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
 
 @lru_cache(maxsize=4)
 def limits(study: Study) -> dict[str, Any]:
-    """Return a dict of facts that limit the conclusions from a study's runs.
+    """Return a dict of facts that limit the conclusions from the runs of a study of one world.
 
-    A value is 0, False or empty if the limit does not apply. The keys are
+    If a limit does not apply, its value is 0, False or empty. The keys are
 
     - ``runs``, ``failed``, ``reasons``: as in :func:`failures_in`;
-    - ``searches``: id of a search for the optimum that applies to the study's world;
-    - ``reconstructed``: titles of the individual tasks whose goals are reconstructed;
+    - ``searches``: a list with the id of a search for the optimum that can run in the study's
+      world; empty if there is none;
+    - ``reconstructed``: titles of the individual tasks of which a part is reconstructed;
     - ``unproven``: titles of the individual tasks whose best known reward is not proven to be the
-      optimum, and is not only known from this folder;
+      optimum, except the tasks in ``own``;
     - ``own``: titles of the individual tasks whose best known reward is known only from this
       folder;
     - ``unknown``: titles of the individual tasks without a best known reward;
-    - ``trials``: numbers of trials of the learner that differ from the paper's number;
+    - ``trials``: numbers of trials in runs of the learner that differ from the paper's number;
     - ``few``: smallest number of runs of the paper's learner on a task, if it is below the paper's
       number of runs;
     - ``seed``: seed of the suite;
-    - ``processor`` and ``cores``: processor of the machine, and its number of cores;
-    - ``side_by_side``: True if several runs were made at the same time;
-    - ``dirty``: True if the code had changes that were not committed;
+    - ``processor`` and ``cores``: processor of the machine of the last ``coartic run``, and its
+      number of cores;
+    - ``side_by_side``: True if one process made several runs side by side;
+    - ``dirty``: True if runs were made by code with changes that were not committed;
     - ``late``: warnings about methods (:attr:`.Study.marks`);
-    - ``imports``: a dict that maps the title of each method from a file to the packages that the
-      file imports.
+    - ``imports``: a dict that maps the title of each method from a file to a string that lists the
+      packages that the file imports.
 
     The dict is cached: do not change it.
     """
@@ -500,7 +512,7 @@ def limits(study: Study) -> dict[str, Any]:
 
 
 def failed_methods(study: Study) -> list[str]:
-    """Return a sentence for each method that is not ranked because runs failed."""
+    """Return a sentence for each method that is not ranked and has failed runs."""
     rows = standings(study).query("why != '' and failed > 0")
     where = f" in {world_title(study.world)}" if study.world else ""
     return [
@@ -513,8 +525,8 @@ def failed_methods(study: Study) -> list[str]:
 def failures_in(runs: pd.DataFrame) -> dict[str, Any]:
     """Return a dict with the numbers of ``runs`` and ``failed`` runs, and ``reasons`` of failures.
 
-    The reasons are the three most frequent ones with their numbers, and the number of other
-    failures.
+    The reasons are a list of strings: the three most frequent reasons with their numbers of runs,
+    and the number of runs that failed for other reasons, if there are any.
     """
     failed = runs[runs.status != "ok"]
     reasons = failed.reason.fillna("")
@@ -527,14 +539,16 @@ def failures_in(runs: pd.DataFrame) -> dict[str, Any]:
 
 
 def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
-    """Return the sentences on best known rewards that follow below a table (:func:`limits`).
+    """Return the sentences on best known rewards that follow below a table.
 
-    ``columns`` are the names of the columns of the table.
+    ``columns`` are the names of the columns of the table. The tasks are those of :func:`limits`.
 
-    - If it has ``gap`` or ``optimum``, a sentence names the tasks whose best known rewards are not
-      proven.
-    - If it has ``gap``, a sentence names the tasks whose best known rewards are known only from
-      this folder.
+    - If the table has column ``gap`` or ``optimum``, a sentence names the tasks whose best known
+      rewards are not proven to be the optimum.
+    - If the table has column ``gap``, a sentence names the tasks whose best known rewards are known
+      only from this folder.
+
+    A sentence without tasks is left out.
     """
     unproven, own, columns = limits(study)["unproven"], limits(study)["own"], set(columns)
     notes = []

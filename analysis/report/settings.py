@@ -1,4 +1,4 @@
-"""Write the finding of a study that varies parameters.
+"""Make the finding of a study that varies parameters.
 
 The finding says which setting is best, and how each parameter changes the gap.
 """
@@ -31,8 +31,8 @@ from coartic.estimates import LEVEL, MIN_VALUES
 
 TOO_FEW = f" (too few runs to test, which needs {MIN_VALUES})"
 MAX_NAMED = 3
-"""Largest number of settings that are named because they do not differ significantly from the best
-setting."""
+"""Largest number of settings that the finding names because their gaps do not differ significantly
+from the gap of the best setting. Further settings are counted."""
 
 
 def answer_on_parameters(study: Study) -> list[str]:
@@ -41,13 +41,13 @@ def answer_on_parameters(study: Study) -> list[str]:
     Returns
     -------
     list of str
-        - A line on the best setting: its gap, the settings that do not differ significantly from
-          it, the default setting, and the parameters that have a better value on average than in
-          the best setting.
+        - A line on the best setting: its gap; the settings that do not differ significantly from it
+          or, if there are none, the setting that comes next; the default setting; and the
+          parameters of which another value is better on average.
         - For each parameter, a line on how much its values change the gap
           (:func:`.list_parameters`).
-        - A line on how many settings are worse than the corrective process alone, if there are such
-          settings.
+        - If there are settings that are worse than the corrective process alone, a line with their
+          number.
 
         The list is empty if no setting is ranked.
     """
@@ -59,7 +59,10 @@ def answer_on_parameters(study: Study) -> list[str]:
 
 
 def _best_setting(study: Study, rows: pd.DataFrame) -> str:
-    """Return sentences on the best setting, which is the first of the ranked settings ``rows``."""
+    """Return sentences on the best setting.
+
+    ``rows`` contains the ranked settings in order, the best one first.
+    """
     best, base = str(rows.index[0]), str(rows.method_id.iloc[0])
     method = {**rows.iloc[0], "title": title_of(study.declared[base])}
     others = list_differences(study)
@@ -101,7 +104,10 @@ def _best_setting(study: Study, rows: pd.DataFrame) -> str:
 
 
 def _effect_of(study: Study, parameter: str) -> str:
-    """Return a sentence on how much the values of a parameter change the gap."""
+    """Return a sentence on how much the values of a parameter change the gap.
+
+    If the values cannot be compared, the sentence says so.
+    """
     table = list_parameters(study)
     rows = table[table.parameter == parameter]
     if not len(rows):
@@ -132,9 +138,10 @@ def _effect_of(study: Study, parameter: str) -> str:
 
 
 def _settings_behind(study: Study, rows: pd.DataFrame) -> str:
-    """Return a sentence on the ranked settings that are worse than the corrective process.
+    """Return a sentence on the ranked settings that are worse than the corrective process alone.
 
-    ``rows`` are the ranked settings. The result is the empty string if there is no such setting.
+    ``rows`` are the ranked settings. A setting is worse if its mean share of the possible gain is
+    below 0. The result is the empty string if there is no such setting.
     """
     behind = rows[rows.share < 0]
     if not len(behind):
@@ -153,7 +160,7 @@ def _settings_behind(study: Study, rows: pd.DataFrame) -> str:
 
 
 def _words(study: Study, label: str) -> str:
-    """Describe the values that the setting ``label`` gives to the varied parameters."""
+    """Return the values of the varied parameters in the setting ``label`` in words."""
     return describe_values(dict(zip(study.varied.columns, study.varied.loc[label], strict=True)))
 
 
@@ -163,15 +170,15 @@ def _gap_of(gap: float) -> str:
 
 
 def _points(gaps: pd.Series) -> str:
-    """Return the range of gaps (fractions), largest minus smallest, in percentage points."""
+    """Return the largest minus the smallest gap (fractions) as a string, in percentage points."""
     return number(100 * float(gaps.max() - gaps.min()), 1)
 
 
 def _range_of(values: Sequence[Any]) -> str:
     """Return the values of a parameter in words.
 
-    More than two numbers become a range, such as ``0.02 to 0.2``. Up to four other values are
-    listed; more values are only counted.
+    At least three numbers become a range, such as ``0.02 to 0.2``. Otherwise, up to four values are
+    listed, and more values are only counted, such as ``5 values``.
     """
     if are_numbers(values) and len(values) > 2:
         return f"{values[0]} to {values[-1]}"
