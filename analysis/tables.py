@@ -469,7 +469,7 @@ def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[st
             label=f"tab:coartic-{table.id}{ending_of(study)}",
         )
     )
-    if "†" in body or any("†" in note for note in notes):
+    if latex("†") in body or any("†" in note for note in notes):
         notes = [*notes, RECONSTRUCTED]
     needs = "% needs \\usepackage{booktabs,longtable} and \\usepackage[T1]{fontenc}; letters that\n"
     needs += "% pdfLaTeX does not know need XeLaTeX or LuaLaTeX and a font that has them"
