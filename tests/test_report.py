@@ -74,6 +74,14 @@ def test_a_value_without_a_column_and_a_column_without_a_value_are_errors(traced
     assert tables.csv_of(frame).splitlines() == ["row,method,gpa,run_ids", "a row,mine,1.0,"]
 
 
+def test_a_dagger_in_a_latex_table_is_explained_below_it(traced):
+    frame = TABLES["methods"](traced)[:1]
+    explained = "The paper does not publish the goals of this task"
+    for task, count in (("two-armed task 1 †", 1), ("ascending", 0)):
+        text = tables.latex_of(TABLES["methods"], traced, frame.assign(task=task))
+        assert text.count(explained) == count
+
+
 HOSTILE = '<script>alert("&")</script> \\input{x} 5 % of $x_1^2$ #~'
 
 
