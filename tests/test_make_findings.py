@@ -137,6 +137,22 @@ def test_links_of_pages_name_files_that_are_there():
     assert not lost
 
 
+def test_leans_of_the_readme_are_what_the_tables_say():
+    """Of base and joints at the goal that ascending and descending share."""
+    text = (ROOT / "README.md").read_text("utf-8")
+    ids = {
+        "CMA-ES": "cma-es/bandit", "shortest-path plan": "trajectory-optimisation/path-length",
+        "the paper's learner": "dual-process/EC1", "random search": "random-search",
+        "corrective process": "corrective-alone/given",
+    }  # fmt: skip
+    leans = make_findings.table("comparison", "contexts").set_index("method").loc[[*ids.values()]]
+    rows = re.findall(r"^   \| ([^|]+?) \| (\d+) % \|$", text, re.MULTILINE)
+    assert [name.split(",")[0] for name, _ in rows] == [*ids]
+    assert [int(lean) for _, lean in rows] == [*(100 * leans.lean_base).round()]
+    ends = [round(100 * end) for end in (leans.lean_joints.min(), leans.lean_joints.max())]
+    assert f"between {ends[0]} % and {ends[1]} %" in re.sub(r"\s+", " ", text)
+
+
 def test_the_first_table_of_the_readme_is_what_the_tables_say():
     """Mean gaps over random tasks, by method, without and with motor noise."""
     text = (ROOT / "README.md").read_text("utf-8")
