@@ -341,9 +341,9 @@ def count_trials(count: int) -> None:
 def trials_outside() -> int:
     """Return how many trials this process has made outside the sessions of runs.
 
-    The number includes all trials of the learner's kernel, which no session subtracts. The runner
-    uses the number only for methods that do not belong to this project: their trials outside the
-    session are an error.
+    The number also includes trials that compiled methods of this project make in a run without
+    their session. The runner uses the number only for other methods, for which a trial outside the
+    session is an error.
     """
     return _outside
 
