@@ -32,7 +32,7 @@ LEVEL = 0.05
 Resamples = Annotated[int, Field(ge=1, le=10_000_000)]
 """Type of a parameter: number of bootstrap resamples."""
 RESAMPLES = 9_999
-"""Default number of resamples. 5 % and 1 % of this number plus 1 are integers."""
+"""Default number of resamples: one less than 10,000, of which 5 % and 1 % are integers."""
 SEED = 0
 """Seed of resampling."""
 MIN_VALUES = 5

@@ -506,10 +506,10 @@ def score(
         - ``completed``: share of trials that hit all goals in less than 1,000,000 ticks; NaN for
           the best known solution.
 
-        With motor noise a row has 100 trials on each task. Without it there is one trial on each
-        task, except for random actions (``episodes``). Reward and gap are NaN for a row with a
-        failed trial, and where they are unknown. ``attrs["units"]`` is a dict that maps columns to
-        units.
+        With motor noise there are 100 trials of each policy, of random actions and of the
+        corrective process on each task. Without motor noise there are ``episodes`` trials of random
+        actions and one trial of each of the others. Reward and gap are NaN for a row with a failed
+        trial, and where they are unknown. ``attrs["units"]`` is a dict that maps columns to units.
 
     Raises
     ------

@@ -38,8 +38,9 @@ class MotionModel(NamedTuple):
     """
 
     gain: float = 0.05
-    """α: step size of the corrective process, ``q += α Jᵀ e`` (published). α has no unit for the
-    base; for the joints its unit is rad² per squared length unit."""
+    """α: step size of the corrective process, ``q += α Jᵀ e``, where e is the vector from the hand
+    to the goal (published). α has no unit for the base; for the joints its unit is rad² per squared
+    length unit."""
 
     correction_tolerance: float | None = None
     """Distance of the hand from the goal's centre (in length units) at which the corrective process

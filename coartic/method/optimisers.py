@@ -112,7 +112,7 @@ class Objective:
     - If all entries of a goal are NaN, there is no movement to a target: only the corrective
       process acts. If the hand is in the goal already, this costs no ticks, whereas a movement to a
       target takes at least one tick.
-    - A trial fails if its point has an entry beyond 100,000.
+    - A trial fails if its point has an entry beyond ±100,000.
     - With motor noise the cost of a point differs from trial to trial. :attr:`best_cost` is the
       lowest of many noisy costs, and therefore partly luck. To compare points fairly, evaluate them
       with the same noise draws (:meth:`many`).
@@ -131,8 +131,8 @@ class Objective:
     session : Session
         Session in which the trials are made and counted.
     hands : str, optional
-        Hand sequence of the first trial, such as ``"RRLR"``. By default the sequences of
-        :func:`sequences_of` are tried, and the best one is used.
+        Hand sequence of the first trial and of points, such as ``"RRLR"``. By default the sequences
+        of :func:`sequences_of` are tried, and the one with the highest reward is used.
     half_width : float
         Half the width of the bounds around ``x0``, in length units (base) and rad (joints).
     trials : int, optional
@@ -362,8 +362,8 @@ class Objective:
     def best_x(self) -> Array:
         """A copy of the point of the best trial so far, shape ``(dim,)``.
 
-        With the hands :attr:`best_hands` this point costs :attr:`best_cost`. All entries are NaN
-        until a point is better than the corrective process on its own.
+        In its trial, with the hands :attr:`best_hands`, this point cost :attr:`best_cost`. All
+        entries are NaN until a point is better than the corrective process on its own.
         """
         return self._best_x.copy()
 

@@ -64,7 +64,8 @@ class Information(StrEnum):
     NOISE_DRAWS = "draws of the noise"
     """The choice of the noise draw of each trial. By default trial k has draw k."""
     REWARD_FORMULA = "reward as a formula"
-    """The rule that a movement costs reward in proportion to its path in joint space."""
+    """The rule that a movement costs reward in proportion to the length of its path in joint
+    space."""
     SECONDARY_OBJECTIVES = "secondary objectives"
     """Objectives beyond hitting the goals, such as smoothness."""
 
@@ -532,9 +533,9 @@ class Session:
         hands : str or sequence of str
             One hand sequence for all trials (``"RRLR"``), or a sequence for each.
         targets : array_like, shape (N, G, dof)
-            Targets, in length units (base) and rad (joints). A joint whose target is NaN does not
-            move. If all targets of a goal are NaN, there is no movement to a target: only the
-            corrective process acts, and the method has to declare it. A trial with a target beyond
+            Targets, in length units (base) and rad (joints). A coordinate whose entry is NaN does
+            not move. If all entries of a goal are NaN, there is no movement to a target: only the
+            corrective process acts, and the method has to declare it. A trial with an entry beyond
             ±100,000 fails without a movement (:meth:`trial` raises an error instead).
         until : array_like, shape (N,), optional
             A threshold for the reward of each trial. The first trial whose reward exceeds its

@@ -125,8 +125,8 @@ def execute(
     """Execute a solution from the task's start, and score it.
 
     If the movements for a goal miss the goal, the corrective process starts from the robot's
-    present configuration and makes a corrective movement. The ticks of this movement are counted,
-    too.
+    present configuration and makes a corrective movement. The ticks of this movement are counted as
+    well.
 
     Parameters
     ----------
@@ -154,8 +154,8 @@ def execute(
         - a target has the wrong shape, an infinite entry, or NaN in all entries;
         - a target moves a locked base coordinate by more than 1e-6.
     ValueError
-        A constant of the model is out of bounds, or the model has motor noise
-        (:func:`execute_noisy`).
+        A constant of the model is out of bounds or does not fit the radius of the goals, or the
+        model has motor noise (use :func:`execute_noisy`).
 
     Notes
     -----

@@ -145,7 +145,7 @@ class _Alignment(FileData):
 
 
 class Posture(FileData):
-    """Posture of an arm at the start."""
+    """Distribution of the posture of an arm at the start."""
 
     first: Range
     """Smallest and largest angle of the first joint, measured from +x (in rad)."""
@@ -157,7 +157,7 @@ _PARKED = Posture(first=(0, 0), others=(0, 0))
 
 
 class Postures(FileData):
-    """Postures of both arms at the start.
+    """Distributions of the postures of both arms at the start.
 
     An arm without an entry is straight along +x.
     """
@@ -421,8 +421,8 @@ def named_by(text: str) -> list[str]:
 
     Both ends are included. If ``text`` is not a range, but for example the name or the file of a
     task, the only entry of the list is ``text`` itself, unchecked. Raises TaskError for a range
-    that is malformed, goes backwards or has more than 10,000 instances. The file of a family must
-    exist, but it is not checked whether a family with another name exists.
+    that is malformed, goes backwards or has more than 10,000 instances, and for a range in a family
+    file that cannot be used. For any other family it is not checked whether the family exists.
 
     Examples
     --------

@@ -210,7 +210,7 @@ class Task(FileData):
 
     @property
     def family(self) -> str | None:
-        """Name of the family with its version if the task is an instance; otherwise None."""
+        """Name of the family with its version, from the name of an instance; otherwise None."""
         address = address_of(self.name)
         return address and address.family
 
@@ -394,9 +394,9 @@ def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float
     """Return how far a goal is out of a hand's reach (in length units).
 
     The result is at most 0 if the hand can come within ``tolerance`` of the goal's centre.
-    Otherwise it is the distance by which the hand stays farther away than that. The hand can be at
-    any distance from its shoulder between the two distances of :meth:`.Robot.reach`, and base
-    coordinates that are not locked can take any value.
+    Otherwise it is the smallest possible distance of the hand from the centre, minus ``tolerance``.
+    The hand can be at any distance from its shoulder between the two distances of
+    :meth:`.Robot.reach`, and base coordinates that are not locked can take any value.
     """
     arm = task.robot.arm(hand)
     near, far = task.robot.reach(hand)

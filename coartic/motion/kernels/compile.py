@@ -208,8 +208,8 @@ def import_numba() -> Any:
 def _set_up_numba() -> Any:
     """Import Numba, set it up, and return the module.
 
-    LLVM's options change only the speed of kernels. The options have no effect if the program has
-    compiled something else with Numba before.
+    The options that are set for LLVM change only the speed of kernels. They have no effect if the
+    program has compiled something else with Numba before.
     """
     modules: dict[str, Any] = sys.modules
     yaml_module = {"yaml": modules["yaml"]} if "yaml" in modules else {}

@@ -16,8 +16,8 @@ movement ends if
   that it has at the target, or
 - the point is the last one, q^t.
 
-A movement of k steps takes k + 1 ticks; the last tick detects arrival (inferred: it gives the
-initial rewards that follow from the paper exactly).
+A movement of k steps takes k + 1 ticks; the last tick detects arrival (inferred: this gives exactly
+the initial rewards that follow from the paper).
 
 The kernels move many arms at once. They skip points at which the movement certainly cannot end
 (:func:`clear_steps`). The results are those of a loop that evaluates the stopping rule at each

@@ -6,7 +6,7 @@ phases (paper, sections *Generating Movement for Each Goal* and *The Corrective 
 1. *begin*: the run's next goal is set.
 2. *aim*: a hand and, usually, a target are chosen. How they are chosen depends on the caller.
 3. *move*: the robot moves to the target. Without a target it only checks whether its hand is in the
-   goal already.
+   goal already; an option leaves out this check.
 4. *correct*: if the goal is missed, the corrective process **A** looks for a configuration that
    hits the goal, and the robot moves to that configuration.
 5. *record*: the results at the goal are recorded. The trial goes on if the goal is hit.
@@ -155,8 +155,9 @@ class Requests(NamedTuple):
     """Hand for each goal, 0 left or 1 right, shape ``(N, G)``."""
     targets: Configs
     """Targets, shape ``(N, G, M, dof)``, in length units and rad; NaN for coordinates that do not
-    move. The target of a path is its last waypoint. The first movement for a goal is always made,
-    further movements only while the goal is missed."""
+    move. If all entries of a target are NaN, there is no movement. The target of a path is its last
+    waypoint. The first movement for a goal is always made, further movements only while the goal is
+    missed."""
     movements: NDArray[np.int64]
     """Action and waypoints of each movement, shape ``(N, G, M, 3)``:
 
