@@ -59,8 +59,8 @@ def answer_of(result: Result, model: MotionModel) -> Result:
 
     Without motor noise this is the result itself. With motor noise it is a copy with these changes:
 
-    - The movements of the solution have no ticks, and corrective movements have no targets
-      (:func:`.next_action`), because both depend on a single draw of the noise.
+    - The movements of the solution have no ticks, and corrective movements have no targets, because
+      both depend on a single draw of the noise (:func:`coartic.motion.solution.next_action`).
     - ``initial`` and ``replay`` are empty for the same reason.
 
     Examples

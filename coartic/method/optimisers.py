@@ -81,7 +81,7 @@ def sequences_of(session: Session) -> list[str]:
 
     The order is alphabetical, except that the initial hand sequence comes first if the task names
     one. If there are more than 4096 sequences, the list contains only the result of
-    :meth:`Session.find_initial_hands`; the errors of that function are raised.
+    :meth:`.Session.find_initial_hands`; the errors of that function are raised.
     """
     if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
         return [session.find_initial_hands()]
@@ -103,7 +103,7 @@ class Objective:
 
     A point is a vector of ``dim`` numbers, in length units (base) and rad (joints). It consists of
     one part for each goal, in the order of the goals. A part contains the target of each explored
-    entry of a configuration (:func:`explored_joints`).
+    entry of a configuration (:func:`.explored_joints`).
 
     - The cost of a point is minus the reward of its trial, or ``FAILED`` if the trial fails or
       takes more than ``FAILED`` ticks.
@@ -118,9 +118,9 @@ class Objective:
       with the same noise draws (:meth:`many`).
 
     The constructor makes the first trials, in which only the corrective process acts: one trial
-    with ``hands``, or one trial with each sequence of :func:`sequences_of` until the budget is used
-    up. The sequence with the highest reward becomes :attr:`hands`, the default hand sequence of all
-    points.
+    with ``hands``, or one trial with each sequence of :func:`.sequences_of` until the budget is
+    used up. The sequence with the highest reward becomes :attr:`hands`, the default hand sequence
+    of all points.
 
     Threads can share an objective; their trials are made one after the other. Copying an objective,
     or evaluating it in a forked process, raises CoarticError, because trials of a copy or of
@@ -132,7 +132,7 @@ class Objective:
         Session in which the trials are made and counted.
     hands : str, optional
         Hand sequence of the first trial and of points, such as ``"RRLR"``. By default the sequences
-        of :func:`sequences_of` are tried, and the one with the highest reward is used.
+        of :func:`.sequences_of` are tried, and the one with the highest reward is used.
     half_width : float
         Half the width of the bounds around ``x0``, in length units (base) and rad (joints).
     trials : int, optional
@@ -149,7 +149,7 @@ class Objective:
     NotApplicableError
         There are more than 4096 hand sequences, and no initial one is found.
     UndeclaredError
-        The session's information does not include :data:`OPTIMISER_INFORMATION`.
+        The session's information does not include :data:`.OPTIMISER_INFORMATION`.
     ValueError
         ``hands`` do not fit the task, or ``half_width`` is not from 1e-9 to 100.
     """

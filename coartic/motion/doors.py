@@ -24,7 +24,7 @@ from coartic.robot import BASE_DOF, HANDS, MAX_ENTRY, Array, Hand, Robot
 
 
 class MoveResult(NamedTuple):
-    """Result of one movement (:func:`move`, :func:`follow`)."""
+    """Result of one movement (:func:`move`, :func:`coartic.motion.doors.follow`)."""
 
     q: Array
     """Configuration in which the movement stopped, shape ``(dof,)``, in length units and rad."""
@@ -33,9 +33,8 @@ class MoveResult(NamedTuple):
     hit: bool
     """True if the hand is within the goal's radius."""
     evaluations: int
-    """Number of forward-kinematics evaluations. On a path (:func:`follow`) there is one per tick. A
-    straight movement (:func:`move`) can have fewer, because steps that cannot end it are
-    skipped."""
+    """Number of forward-kinematics evaluations. On a path there is one per tick. On a straight
+    movement there can be fewer, because steps that cannot end the movement are skipped."""
 
 
 class Correction(NamedTuple):
