@@ -351,9 +351,10 @@ class TaskEnv(gymnasium.Env):
         self._found_at_start = self._reached_by(range(len(sides)))
 
     def _reach(self, compiled: CompiledTask, hand: int, targets: Array) -> NDArray[np.void]:
-        """Reach for the next goal with a hand, and for the goal after it if ``targets`` has two.
+        """Reach for the next goal with a hand, and perhaps for the goal after it.
 
-        Both movements are made in one call, because each call is slow.
+        The robot reaches for as many goals as ``targets`` has. Both movements are made in one call,
+        because each call is slow.
 
         Parameters
         ----------
@@ -843,7 +844,10 @@ def _corrective_rewards(task: Task, seed: int, model: MotionModel) -> Any:
 
 
 def _judged(task: Task, solution: Sequence[Movement], seed: int, model: MotionModel) -> Any:
-    """Return the rewards of executions of a solution: 100 with motor noise, and one without it."""
+    """Return the rewards of executions of a solution.
+
+    There are 100 rewards with motor noise, and one reward without it.
+    """
     if model.motor_noise == 0.0:
         return [execute(task, solution, model=model).reward]
     noise, exact = model.motor_noise, model.without_noise()

@@ -190,7 +190,7 @@ class Method(ABC):
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
     def inapplicable_reason(self, task: Outline) -> str | None:
-        """Return a sentence on why the method does not apply to a task; None if it applies.
+        """Return a sentence on why the method does not apply to a task, or None.
 
         By default a method applies to every task.
         """
@@ -198,7 +198,7 @@ class Method(ABC):
 
     @classmethod
     def refuses(cls, model: MotionModel) -> str | None:
-        """Return a sentence on why the method cannot run under a motion model; None if it can.
+        """Return a sentence on why the method cannot run under a motion model, or None.
 
         The sentence names the first constant that differs from the paper's and is not in
         :attr:`adapts_to`.

@@ -281,9 +281,9 @@ class Session:
         return self._task.robot.dof
 
     def joints(self, hand: Hand) -> slice:
-        """Return the slice of a configuration that holds the joint angles of a hand's arm (in rad).
+        """Return the slice of a configuration with the joint angles of a hand's arm.
 
-        Raises ValueError for an unknown hand.
+        The angles are in rad. Raises ValueError for an unknown hand.
         """
         return self._task.robot.joints(hand)
 

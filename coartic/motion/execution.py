@@ -104,7 +104,7 @@ class Execution:
 
     @property
     def hands(self) -> str:
-        """Hand of each goal that has a movement, in goal order, such as ``"LRLR"``."""
+        """Hand sequence of the goals that have movements, such as ``"LRLR"``."""
         return hands_in(self.movements)
 
     def ticks_by_goal(self) -> tuple[int, ...]:
@@ -244,7 +244,7 @@ def _requested(
     aims : sequence of list of list
         For each solution and goal, the movements of :func:`_with_targets`.
     hands : list of int
-        One list with the hand of each goal of each solution, 0 left or 1 right.
+        Hands of all goals of all solutions, 0 left or 1 right.
     """
     goals = [movements for of_solution in aims for movements in of_solution]
     length = max(map(len, goals))
@@ -563,7 +563,7 @@ def execute_noisy(
 
 
 def _hands_of(plans: Sequence[Plan]) -> list[int]:
-    """Return one list with the hand of each goal of each plan, 0 left or 1 right."""
+    """Return a list of the hands of all goals of all plans, 0 left or 1 right."""
     return [HANDS.index(movements[0].hand) for plan in plans for movements in plan]
 
 

@@ -143,9 +143,10 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
-    """Check hands and return them as a tuple; None stands for all hands of the task.
+    """Check hands, and return them as a tuple.
 
-    Raises ValueError if ``hands`` is empty or names a hand that the task does not have.
+    None stands for all hands of the task. Raises ValueError if ``hands`` is empty or names a hand
+    that the task does not have.
     """
     if hands is None:
         return task.hands

@@ -71,7 +71,7 @@ class Movement:
 
 
 def hands_in(movements: Iterable[Movement]) -> str:
-    """Return a string with the hand of each goal that has a movement, such as ``"LRLR"``."""
+    """Return the hand sequence of the goals that have movements, such as ``"LRLR"``."""
     by_goal = {movement.goal: movement.hand for movement in movements}
     return letters_of([by_goal[goal] for goal in sorted(by_goal)])
 

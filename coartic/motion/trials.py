@@ -103,10 +103,11 @@ def noise_seed(seed: int, world: int = PRACTICE) -> int:
 
 
 def noise_draws(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
-    """Return an array with the noise seed and the noise draw of each of N trials, shape ``(N, 2)``.
+    """Combine the noise seeds and the noise draws of N trials, shape ``(N, 2)``.
 
-    The result is a value for :attr:`Requests.worlds`. ``seeds`` (from :func:`noise_seed`) and
-    ``draws`` are integers, or arrays of shape ``(N,)``.
+    A row of the result contains the seed and the draw of a trial; the result is a value for
+    :attr:`Requests.worlds`. ``seeds`` (from :func:`noise_seed`) and ``draws`` are integers, or
+    arrays of shape ``(N,)``.
     """
     pairs = np.broadcast_arrays(np.asarray(seeds, np.uint64), np.asarray(draws, np.uint64))
     return np.stack(np.atleast_1d(*pairs), axis=1)
@@ -329,7 +330,7 @@ _outside = 0
 
 
 def count_trials(count: int) -> None:
-    """Add ``count`` to the number of trials that this process made outside the sessions of runs.
+    """Add to the number of trials that this process made outside sessions of runs.
 
     Trials are added whenever they are made. The session of a run then subtracts the trials that it
     made itself, by a negative ``count``. :func:`trials_outside` returns the number.

@@ -263,7 +263,7 @@ def draft(family: Family, address: Address, attempt: int) -> Task:
 
 
 def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list[tuple[int, int]]:
-    """Draw goals, and return a list of their x and y in thousandths of a length unit.
+    """Draw goals, and return their x and y in thousandths of a length unit.
 
     - Family without a line: the goals are drawn in a box, which is itself drawn in the region.
     - Family with a line: the goals are on a line, possibly outside the region. If there are more
@@ -486,7 +486,7 @@ def load_family(name: str) -> Family:
 
 
 def is_family(name: str) -> bool:
-    """Return whether a string is the name of a shipped family, or the path of a family's file.
+    """Return whether a string names a shipped family or the file of a family.
 
     A ``.toml`` file is the file of a family if it can be read and contains the key ``region``.
     """

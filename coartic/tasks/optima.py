@@ -52,7 +52,7 @@ class KnownOptimum:
 
     @property
     def proven(self) -> bool:
-        """True if the reward is equal to its proven bound, so that no solution is better."""
+        """True if the reward equals its proven bound, so that no solution is better."""
         return self.bound == self.reward
 
 

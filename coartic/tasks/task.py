@@ -115,7 +115,7 @@ def address_of(name: str) -> Address | None:
 
 
 class Provenance(FileData):
-    """Source of the numbers of a field of a task: a value of the dict ``Task.provenance``."""
+    """Source of the numbers of a field of a task (:attr:`.Task.provenance`)."""
 
     status: Literal["published", "inferred", "chosen"]
     """Whether the numbers are published in the paper, inferred from the paper, or chosen by the
@@ -226,8 +226,7 @@ class Task(FileData):
 
     @property
     def reconstructed(self) -> tuple[str, ...]:
-        """Keys in ``provenance`` whose numbers were inferred from the paper, such as
-        ``"goals"``."""
+        """Names of the fields whose numbers were inferred from the paper, such as ``"goals"``."""
         return tuple(k for k, entry in self.provenance.items() if entry.status == "inferred")
 
     @model_validator(mode="before")
@@ -470,7 +469,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
 
 
 def _all_keys() -> list[str]:
-    """Return a list of the keys of task files, including the keys in tables, without ``q0``."""
+    """Return the keys of task files, including the keys in tables, without ``q0``."""
     robot = [field.name for field in fields(Robot)]
     return [*Task.model_fields, *Start.model_fields, *robot, *Provenance.model_fields]
 

@@ -52,7 +52,7 @@ def python_files(*folders: str) -> list[Path]:
 
 
 def hash_of_files(files: Iterable[Path]) -> str:
-    """Return a hash of the names and the contents of files: 16 hex digits of their SHA-256."""
+    """Return a hash of the names and contents of files: 16 hex digits of SHA-256."""
     texts = (path.name.encode() + b"\0" + path.read_bytes() for path in files)
     return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
 

@@ -84,7 +84,7 @@ def largest_square(length: float) -> float:
 
 @inner
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
-    """Return a lower bound on the number of steps until a hand can enter a disc.
+    """Return a lower bound on the steps before a hand can enter a disc.
 
     The bound is usually not an integer. It is 0 if the hand may be in the disc already.
 
@@ -289,7 +289,7 @@ def move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> No
 
 @inlined
 def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Perform the next ``action`` of each of the first ``count`` runs, unless it is a path.
+    """Perform the next ``action``, except paths, of the first ``count`` runs.
 
     The actions are listed at :data:`IDLE`. ``q``, ``hit``, ``ticks``, ``evaluations``, ``acting``
     and ``end`` change in place. After ``IDLE`` and ``CHECK`` the ticks are 0. With noise, ``end``

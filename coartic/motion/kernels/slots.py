@@ -367,10 +367,10 @@ def padded_count(count: int) -> int:
 
 @inlined
 def winding(q: Any, slot: int) -> float:
-    """Return an upper bound on the sizes of the link angles of an arm, measured from +x (in rad).
+    """Return an upper bound on the sizes of the link angles of an arm (in rad).
 
-    The bound is the sum of the absolute values of the joint angles of the arm in ``slot``. ``q``
-    has a column for each slot.
+    Link angles are measured from +x. The bound is the sum of the absolute values of the joint
+    angles of the arm in ``slot``. ``q`` has a column for each slot.
     """
     total = 0.0
     for k in range(len(q) - BASE_DOF):

@@ -146,7 +146,7 @@ def count_goal(goal: GoalRecord, counts: Any) -> None:
 
 
 class Requests(NamedTuple):
-    """Requested trials for the kernel: N trials with G goals and M movements for each goal."""
+    """Requests for N trials with G goals, and M movements for each goal."""
 
     starts: Configs
     """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` for the same start of all
