@@ -1,8 +1,8 @@
 """Means and differences of means, with confidence intervals.
 
-A sample consists of the rewards or other scores of independent runs. The confidence intervals are
+A sample consists of independent values, such as the rewards of runs. The confidence intervals are
 those of the BCa bootstrap (bias-corrected and accelerated); :func:`mean_of_means` lists the
-exceptions. All resampling here uses the same seed, :data:`SEED`.
+exceptions. All resampling in this module uses the same seed, :data:`SEED`.
 
 Source: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14.
 """
@@ -32,13 +32,13 @@ LEVEL = 0.05
 Resamples = Annotated[int, Field(ge=1, le=10_000_000)]
 """Type of a parameter: number of bootstrap resamples."""
 RESAMPLES = 9_999
-"""Default number of resamples: 0.05 and 0.01 of 9,999 + 1 are integers."""
+"""Default number of resamples: one less than 10,000, of which 5 % and 1 % are integers."""
 SEED = 0
 """Seed of resampling."""
 MIN_VALUES = 5
-"""Least number of values, such as runs, in each sample for an interval or a test."""
+"""Smallest number of values, such as runs, in each sample for an interval or a permutation test."""
 MIN_TASKS = 3
-"""Least number of random tasks of a family for an interval or a test over tasks."""
+"""Smallest number of random tasks of a family for an interval or a test over tasks."""
 FEWER_RESAMPLES = 1_999
 """Number of resamples where resampling is slow: for large samples, and over instances of
 families."""
@@ -48,9 +48,10 @@ interval of at most :data:`FEWER_RESAMPLES` resamples, which BCa would hardly ch
 HUGE = 50_000
 """Largest size of a sample that is resampled. A larger sample has a normal interval."""
 IN_CACHE = 1 << 18
-"""Number of values that are drawn at a time, so that they fit into the processor's cache."""
+"""Largest number of values that are resampled at a time, so that they fit into the processor's
+cache."""
 NEGLIGIBLE = 1e-9
-"""Differences of at most this fraction of the largest value count as rounding errors."""
+"""Differences of at most this fraction of the largest absolute value count as rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +65,14 @@ class Estimate:
     high: float = math.nan
     """Upper end of the interval."""
     p: float = math.nan
-    """P-value of the test whose statistic is the estimate."""
+    """P-value of a test of the estimated quantity."""
     n: tuple[int, ...] = ()
     """Number of values in each sample."""
     resamples: int = 0
     """Number of resamples of the test; 0 for an exact test or no test."""
     least_p: float = math.nan
-    """Smallest p that the test can give for this number of values. For a bootstrap test this is
-    usually the smallest p of the sign test; the bootstrap test itself can give a smaller p."""
+    """Smallest p that a permutation test can give for these numbers of values. For a bootstrap
+    test, which can give a smaller p, it is usually the smallest p of the sign test."""
 
     def columns(self, name: str) -> dict[str, float]:
         """Return the estimate as a dict of three table columns.
@@ -87,7 +88,7 @@ def vector(values: ArrayLike) -> Array:
 
     Raises ValueError if ``values``
 
-    - is not a vector, or is empty;
+    - is not a vector of real numbers, or is empty;
     - contains NaN, infinite or masked entries;
     - has an entry other than 0 whose absolute value is not from 1e-100 to 1e100.
     """
@@ -114,7 +115,8 @@ def varies(values: Array) -> Array:
     """Return whether values differ along the first axis by more than rounding errors.
 
     The result is an array of bool with the shape of the other axes. An entry is False if the values
-    along the first axis include NaN or infinity. :data:`NEGLIGIBLE` bounds rounding errors.
+    along the first axis include NaN or infinity. Rounding errors are differences of at most
+    :data:`NEGLIGIBLE` times the largest absolute value.
     """
     return np.asarray(np.ptp(values, 0) > NEGLIGIBLE * np.abs(values).max(0))
 
@@ -257,14 +259,15 @@ def mean_of_means(
 def resample_indices(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int64]]]:
     """Yield bootstrap indices in batches of at most 1,000 resamples.
 
-    Equal arguments give equal indices.
+    Batches are smaller if a sample has more than 500 values (:data:`LARGE`). Equal arguments give
+    equal indices.
 
     Parameters
     ----------
     sizes : sequence of int
         Number of values in each sample.
     resamples : int
-        Number of resamples over all batches.
+        Number of resamples in all batches together.
 
     Yields
     ------
@@ -281,7 +284,7 @@ def resample_indices(sizes: Sequence[int], resamples: int) -> Iterator[list[NDAr
 
 @lru_cache(maxsize=8)  # samples often have equal sizes
 def _cached_indices(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.uint16]]]:
-    """Return a list of all batches of :func:`resample_indices`, from a cache.
+    """Return a list of all batches of :func:`resample_indices`, and cache the list.
 
     Do not change the list. The indices are stored in 16 bits, a quarter of their usual memory.
     """
@@ -295,6 +298,6 @@ def standard_deviation(values: Array) -> float:
     """Compute the standard deviation of values, with n - 1 degrees of freedom.
 
     ``values`` has shape ``(n,)``. The result is NaN for fewer than two values. For two or more
-    values, the result is 0 if the values do not vary (:func:`varies`), or include NaN or infinity.
+    values, the result is 0 if the values do not vary (:func:`varies`) or include NaN or infinity.
     """
     return float(np.std(centred(values), ddof=1)) if len(values) > 1 else math.nan

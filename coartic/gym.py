@@ -1,12 +1,14 @@
 """Tasks and families of tasks as environments of Gymnasium.
 
-In each step of an environment the robot reaches for one goal; the reward is minus the control ticks
-that this takes. Importing this module registers the ids of :data:`IDS`: one for each shipped task,
-such as ``coartic/Ascending-v2``, and ``coartic/Task-v2`` for any other task or a family.
+In each step of an environment (:class:`TaskEnv`) the robot reaches for one goal; the reward is
+minus the number of control ticks that this takes. Importing this module registers the ids of
+:data:`IDS`: one for each shipped task, such as ``coartic/Ascending-v2``, and ``coartic/Task-v2``
+for any task or family.
 
-- ``gymnasium.make`` makes an environment, ``gymnasium.make_vec`` a vector environment, and
-  :func:`sb3` environments for Stable-Baselines3.
-- :func:`score` compares policies with planners.
+- ``gymnasium.make`` makes an environment, and ``gymnasium.make_vec`` makes a vector environment.
+- :func:`sb3` makes environments for Stable-Baselines3.
+- :func:`score` compares policies with each other, with random actions and with the best known
+  solutions.
 
 The module needs the extra ``coartic[gym]``.
 """
@@ -58,14 +60,14 @@ except ImportError:
     raise MissingExtraError("coartic.gym needs Gymnasium: pip install 'coartic[gym]'") from None
 
 REACH = 0.5
-"""Half width of the box of targets around a posture, in length units (base) and rad (angles): an
-action entry of 1 moves the target of its joint by this amount."""
+"""Displacement of the target of a joint by an action entry of 1, in length units (base) and rad
+(angles)."""
 JUDGED = 100
 """Number of noise draws over which :func:`score` averages if the model has motor noise."""
 IDS: dict[str, dict[str, Any]] = {
     f"coartic/{name.title().replace('-', '')}-v2": {"task": name} for name in builtin_tasks()
 } | {"coartic/Task-v2": {}}
-"""Dict that maps ids, such as ``coartic/Ascending-v2``, to the options of the environments."""
+"""Dict that maps ids, such as ``coartic/Ascending-v2``, to options of :class:`TaskEnv`."""
 Policy = Callable[[NDArray[np.float32]], ArrayLike] | Method | Any
 _NEUTRAL = (
     *("OrderEnforcing", "PassiveEnvChecker", "SyncVectorEnv"),
@@ -81,8 +83,8 @@ class TaskEnv(gymnasium.Env):
     - *Episode.* An episode is a trial. In each step the robot reaches for the next goal, so that
       the number of steps of a trial is at most the number of goals of the task. Trials are never
       truncated.
-    - *Reward.* The reward of a step is minus its number of control ticks. If the corrective process
-      fails, the reward is -1,000,000, and the trial ends.
+    - *Reward.* The reward of a step is minus its number of control ticks. If the goal is missed
+      even though the corrective process acts, the reward is -1,000,000, and the trial ends.
     - *Random numbers.* Two things can be random: the instance, if the task is a family, and the
       motor noise, if the model has any. ``reset(seed=n)`` begins a trial with noise draw 0 of seed
       n; ``reset()`` begins a trial with the next noise draw.
@@ -115,26 +117,27 @@ class TaskEnv(gymnasium.Env):
 
     Notes
     -----
-    Joints are the base coordinates (in length units) and the angles of the arms (in rad) that can
-    move. The arms are in the order of the task's ``hands``. In a family, the numbers of entries of
-    observations and actions are those for the largest number of links that an arm of the family can
-    have.
+    *Joints* are here the base coordinates that are not locked (in length units) and the joint
+    angles of the arms with the task's ``hands`` (in rad). The arms are in the order of ``hands``. A
+    family has one list of joints for all instances: it contains each base coordinate that can move
+    in some instances, and for each arm the largest number of joints that the family allows.
 
-    An observation, float32 of shape ``(O,)``, has
+    An observation, float32 of shape ``(O,)``, consists of
 
     - for the next goal and each goal ahead, 1 if the goal exists, else 0;
-    - x and y of each of these goals relative to the base (in length units); 0 if the goal does not
-      exist;
-    - the values of the joints;
-    - in a family whose robots have different numbers of links, for each joint 1 if the robot can
-      move it, else 0.
+    - x and y of each of these goals relative to the base (in length units), or 0 if the goal does
+      not exist;
+    - the value of each joint, or 0 if the robot does not have the joint;
+    - for each joint, 1 if the robot can move it, else 0. These entries exist only in a family whose
+      robots can have different numbers of links.
 
-    An action, shape ``(A,)``, consists of an entry for the hand, if the task has two hands, and an
-    entry for each joint. Entries for joints are clipped to the range from -1 to 1.
+    An action, shape ``(A,)``, consists of one entry for the hand, if the task has two hands, and
+    one entry for each joint. Entries for joints are clipped to the range from -1 to 1.
 
     - For each hand, the corrective process finds a posture in which this hand is at the goal. If
-      the entry for the hand is at most 0.5, the hand whose posture is nearer in joint space is
-      chosen. If the entry is above 0.5, the other hand is chosen.
+      the entry for the hand is at most 0.5, the hand is chosen whose posture is nearer to the
+      present configuration, by the Euclidean distance in joint space. If the entry is above 0.5,
+      the other hand is chosen.
     - The target of the movement is the posture of the chosen hand, plus :data:`REACH` times the
       entries for the joints. If the corrective process fails for the chosen hand, the present
       configuration takes the place of the posture of this hand.
@@ -186,8 +189,8 @@ class TaskEnv(gymnasium.Env):
         self.draw = -1
         """Number of the draw of the noise in this trial, from 0; -1 before the first trial."""
         self.outcome = np.nan
-        """Total reward of the last trial that ended (in ticks); NaN if it failed or took 1,000,000
-        ticks or more."""
+        """Total reward of the last trial that ended (in ticks). NaN if this trial failed or took
+        1,000,000 ticks or more, or if no trial has ended."""
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -216,6 +219,8 @@ class TaskEnv(gymnasium.Env):
         ------
         ValueError
             The option or the instance does not exist.
+        gymnasium.error.Error
+            The seed is not an integer of at least 0.
         """
         super().reset(seed=seed)
         if seed is not None or self.draw < 0:
@@ -240,20 +245,20 @@ class TaskEnv(gymnasium.Env):
         Parameters
         ----------
         action : array_like, shape (A,)
-            Entries for hand and joints, from -1 to 1.
+            Entries for hand and joints (:class:`TaskEnv`).
 
         Returns
         -------
         ndarray, shape (O,)
             Observation.
         float
-            Reward: minus the ticks of this step; −1,000,000 if the goal is missed.
+            Reward: minus the ticks of this step, or -1,000,000 if the goal is missed.
         bool
             True if the trial has ended.
         bool
-            False, because trials are not truncated.
+            Always False, because trials are not truncated.
         dict
-            Entries as in :meth:`reset`.
+            The entries ``task`` and ``is_success``, as in :meth:`reset`.
 
         Raises
         ------
@@ -299,6 +304,8 @@ class TaskEnv(gymnasium.Env):
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the robot and its goals; goals that were hit are filled.
+
+        The first trial must have begun.
 
         Returns
         -------
@@ -346,7 +353,8 @@ class TaskEnv(gymnasium.Env):
     def _reach(self, compiled: CompiledTask, hand: int, targets: Array) -> NDArray[np.void]:
         """Reach for the next goal with a hand, and perhaps for the goal after it.
 
-        Both movements are made in one call, because each call is slow.
+        The robot reaches for as many goals as ``targets`` has. Both movements are made in one call,
+        because each call is slow.
 
         Parameters
         ----------
@@ -370,10 +378,10 @@ class TaskEnv(gymnasium.Env):
         return reach_next(compiled, self.q[None], sides, targets, self.goal, worlds).goals[0, :, 0]
 
     def _reached_by(self, hands: range) -> list[Any]:
-        """Let the corrective process reach for the next goal with each hand.
+        """Let the corrective process reach for the next goal with each of some hands.
 
-        ``hands`` are indices in ``task.hands``. Return the per-goal record of each. The process
-        reaches without motor noise, and the robot itself does not move.
+        ``hands`` are indices in ``task.hands``. Return a list with the per-goal record of each
+        hand. The process acts without motor noise, and the environment does not change.
         """
         return [self._reach(self._exact, hand, self._no_targets[:, :1])[0] for hand in hands]
 
@@ -395,8 +403,8 @@ class SharesOfTicks(gymnasium.RewardWrapper):
     """Wrapper that divides the rewards by the ticks of the corrective process.
 
     The divisor is the number of ticks that the corrective process on its own takes for the whole
-    task with the initial hands, but at least 1. If the process does not complete the task, the
-    divisor is 1,000,000. A scaled reward below -2 is raised to -2.
+    task with the initial hands and without motor noise, but at least 1. If the process does not
+    complete the task, the divisor is 1,000,000. A scaled reward below -2 is raised to -2.
     """
 
     def __init__(self, env: gymnasium.Env) -> None:
@@ -404,7 +412,7 @@ class SharesOfTicks(gymnasium.RewardWrapper):
         self._ticks: dict[int, float] = {}
 
     def reward(self, reward: Any) -> float:
-        """Return a scaled reward, at least -2, from a reward (in ticks)."""
+        """Scale a reward (in ticks). The result is at least -2."""
         env: Any = self.unwrapped
         if env.number not in self._ticks:
             corrective = initial_reward(env.task, env.model)
@@ -428,8 +436,8 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> Any:
     -------
     DummyVecEnv
         Environments, made by Stable-Baselines3's ``make_vec_env``. Rewards are divided by the ticks
-        of the corrective process (:class:`SharesOfTicks`). Entry ``episode`` of the infos contains
-        the unscaled reward of a trial, in ticks.
+        of the corrective process (:class:`SharesOfTicks`). At the end of a trial, entry ``episode``
+        of the info contains the unscaled total reward of the trial (in ticks).
 
     Raises
     ------
@@ -461,9 +469,9 @@ def score(
     env : str, Env, VectorEnv or VecEnv
         Id, or environment of this module. For a family, the instances of the test split are scored,
         unless the options name another ``split``. If an environment has wrappers that change
-        observations or actions, the trials are made in the wrapped environment, on its own
-        instances. The rewards in the table are nevertheless in ticks, and the statistics of
-        normalising wrappers are not updated.
+        observations or actions, agents and functions are scored in the wrapped environment, and all
+        rows on its own instances. The rewards in the table are nevertheless in ticks, and the
+        statistics of normalising wrappers are not updated.
     policy : callable, agent, Method or mapping, optional
         One of
 
@@ -472,14 +480,16 @@ def score(
         - a method of the benchmark, such as a planner, that solves each task;
         - a dict that maps names to any of these.
     episodes : int
-        Number of trials of random actions on each task.
+        Number of trials of random actions on each task, from 1 to 10,000. With motor noise the
+        number is always 100.
     seed : int
-        Seed of random actions, of methods and of an environment with wrappers.
+        Seed of random actions, of methods, of an environment with wrappers and of the motor noise.
     vec_normalize : str, Path or VecNormalize, optional
         Normalisation of observations: the ``VecNormalize`` of an agent's training, or the file that
         its ``save`` has written (a pickle: open only files that you trust). The default is the
-        ``VecNormalize`` of ``env`` if ``env`` has no other wrapper, and otherwise the
-        ``VecNormalize`` of the agent's own environment.
+        ``VecNormalize`` of ``env`` if it is the only wrapper of ``env``. Otherwise the default is
+        the ``VecNormalize`` of the agent's own environment, unless ``env`` normalises observations
+        itself.
     **options
         Options of :class:`TaskEnv`, for an environment without wrappers.
 
@@ -489,16 +499,18 @@ def score(
         A row for each policy, for uniformly random actions, for the corrective process with the
         initial hands of each task, and for the best known solution. Columns:
 
-        - ``reward``: mean reward over the tasks (in ticks), with motor noise also over 100 noise
-          draws;
-        - ``gap``: relative gap, that is, the difference from the best known reward divided by the
-          best known reward; mean over the tasks whose best reward is known;
-        - ``gap_low``, ``gap_high``: 95 % interval of the gap (BCa bootstrap) over tasks, or over
-          the trials of a single task;
-        - ``completed``: share of trials that hit all goals in less than 1,000,000 ticks.
+        - ``reward``: mean reward over all trials of all tasks (in ticks);
+        - ``gap``: mean relative gap over the tasks whose best reward is known. The relative gap is
+          (best known reward - reward) / abs(best known reward);
+        - ``gap_low``, ``gap_high``: 95 % bootstrap interval of the gap over tasks, or over the
+          trials of a single task (:func:`coartic.estimates.mean`);
+        - ``completed``: share of trials that hit all goals in less than 1,000,000 ticks; NaN for
+          the best known solution.
 
-        Reward and gap are NaN for a policy that failed in a trial, and where they are unknown.
-        ``attrs["units"]`` is a dict that maps columns to units.
+        With motor noise there are 100 trials of each policy, of random actions and of the
+        corrective process on each task. Without motor noise there are ``episodes`` trials of random
+        actions and one trial of each of the others. Reward and gap are NaN for a row with a failed
+        trial, and where they are unknown. ``attrs["units"]`` is a dict that maps columns to units.
 
     Raises
     ------
@@ -506,27 +518,31 @@ def score(
         One of these is the case:
 
         - the environment is not of this module;
+        - the environments of a vector environment have different options;
         - an agent has other spaces than the environment;
         - an agent was trained with wrappers that the environment does not have;
         - a wrapper does not pass on the options of ``reset``.
     ValueError
-        An option is wrong, the name of a policy is the name of another row, or observations would
-        be normalised twice.
+        An option is wrong, options are passed for an environment with wrappers, the name of a
+        policy is the name of another row, a function does not return a row of actions for each
+        observation, or observations would be normalised twice.
     OSError
         The file of ``vec_normalize`` cannot be read.
-
-    Notes
-    -----
-    With motor noise, all rows, including random actions, are scored on the same 100 noise draws for
-    each task. No method has used these draws before. Solutions of planners and of the corrective
-    process are executed as by :func:`coartic.execute_noisy`. Best rewards are known for the paper's
-    model, and for shipped tasks with motor noise 0.01, too.
+    gymnasium.error.Error
+        The id is unknown.
 
     Warns
     -----
     UserWarning
         An agent was loaded without an environment, and its observations are not normalised. The
         agent may have been trained in ``VecNormalize``.
+
+    Notes
+    -----
+    With motor noise, all rows, including random actions, are scored on the same 100 noise draws for
+    each task. No method uses these draws in its own trials. Solutions of methods and of the
+    corrective process are executed by :func:`coartic.execute_noisy`. :attr:`.Objective.best_known`
+    lists the tasks and models whose best reward is known.
 
     Examples
     --------
@@ -595,10 +611,10 @@ def score(
 
 
 def _square(difference: Array) -> float:
-    """Return the sum of squares of a vector, added one by one.
+    """Return the sum of the squares of a vector, added one after the other.
 
-    NumPy groups the terms by position, so the distances to two mirrored postures, which must be
-    equal, could differ by rounding.
+    NumPy adds the terms in groups, so that rounding could make the distances to two mirrored
+    postures differ, although they must be equal.
     """
     square = 0.0
     for value in difference.tolist():
@@ -611,9 +627,9 @@ def _is_family(task: Any) -> bool:
 
 
 def _layers(env: Any) -> list[Any]:
-    """List the layers of an environment, from the outermost wrapper to the environment inside.
+    """List the layers of an environment, from the outermost wrapper to the innermost environment.
 
-    Below a vector environment, the list goes on with the layers of its first environment. Raises
+    After a vector environment, the list continues with the layers of its first environment. Raises
     TypeError if the environments of a vector environment have different options.
     """
     layers = [env]
@@ -696,7 +712,7 @@ def _actions_of(
 
 
 def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int, seed: int) -> Array:
-    """Make trials side by side on each task of an environment.
+    """Make all trials at once on each task of an environment.
 
     Parameters
     ----------
@@ -753,7 +769,7 @@ def _wrapped_trial(
     number : int
         Index of the task, from 0.
     seed : int
-        Seed of the environment, from which the noise seed for scoring is derived, too.
+        Seed of the environment. The noise seed for scoring is derived from it as well.
     draw : int
         Number of the noise draw.
 
@@ -786,7 +802,7 @@ def _wrapped_trial(
 
 @contextmanager
 def _not_learning(env: Any) -> Iterator[None]:
-    """Freeze the statistics of wrappers that normalise, in a ``with`` block."""
+    """Keep the statistics of normalising wrappers unchanged in a ``with`` block."""
     learning = [
         (layer, name, getattr(layer, name))
         for layer in _layers(env)
@@ -805,8 +821,8 @@ def _not_learning(env: Any) -> Iterator[None]:
 def _rewards_of(method: Method, task: Task, seed: int, model: MotionModel) -> Any:
     """Return the rewards of a method's solution, one for each noise draw.
 
-    Without motor noise there is one reward. All rewards are NaN if the method finds no solution. A
-    reward is NaN if the execution with its noise draw fails.
+    Without motor noise there is one reward. All rewards are NaN if the method does not apply to the
+    task or finds no solution. A reward is NaN, or None without motor noise, if the execution fails.
     """
     with suppress(MethodError, NotApplicableError):
         result, _ = run_method(method, task, seed, model=model)
@@ -817,8 +833,9 @@ def _rewards_of(method: Method, task: Task, seed: int, model: MotionModel) -> An
 def _corrective_rewards(task: Task, seed: int, model: MotionModel) -> Any:
     """Return the rewards of the corrective process with a task's initial hands.
 
-    There is one reward for each noise draw, or one reward without motor noise. A reward is NaN if
-    the execution fails, or if no initial hands are found.
+    There is one reward for each noise draw, or one reward without motor noise. All rewards are NaN
+    if no initial hands are found. A reward is NaN, or None without motor noise, if the execution
+    fails.
     """
     with suppress(NotApplicableError):
         movements = corrective_movements(initial_hands(task, model=model))
@@ -827,7 +844,10 @@ def _corrective_rewards(task: Task, seed: int, model: MotionModel) -> Any:
 
 
 def _judged(task: Task, solution: Sequence[Movement], seed: int, model: MotionModel) -> Any:
-    """Return the rewards of a solution: 100 with motor noise, and one without it."""
+    """Return the rewards of executions of a solution.
+
+    There are 100 rewards with motor noise, and one reward without it.
+    """
     if model.motor_noise == 0.0:
         return [execute(task, solution, model=model).reward]
     noise, exact = model.motor_noise, model.without_noise()

@@ -31,29 +31,31 @@ class MotionModel(NamedTuple):
     movement may be shorter."""
 
     arrival_tolerance: float | None = None
-    """θ^a: a hand has arrived if it is within this distance (in length units) of the position to
-    which its target brings it. None stands for a tenth of the goals' radius, which is 0.01 in the
-    paper's tasks (inferred: the extracted text of the paper has 0.1, which does not give the
+    """θ^a: a hand has arrived if it is within this distance (in length units) of the position that
+    it has in the target configuration. None stands for a tenth of the goals' radius, which is 0.01
+    in the paper's tasks (inferred: the extracted text of the paper has 0.1, which does not give the
     published rewards).
     """
 
     gain: float = 0.05
-    """α: step size of the corrective process, ``q += α Jᵀ e`` (published). α has no unit for the
-    base; for the joints its unit is rad² per squared length unit."""
+    """α: step size of the corrective process, ``q += α Jᵀ e``, where e is the vector from the hand
+    to the goal (published). α has no unit for the base; for the joints its unit is rad² per squared
+    length unit."""
 
     correction_tolerance: float | None = None
-    """Distance from the goal's centre (in length units) at which the corrective process ends. None
-    stands for a tenth of the goals' radius (inferred to be θ^a; the caption of Figure 2 has θ^g).
+    """Distance of the hand from the goal's centre (in length units) at which the corrective process
+    has converged. None stands for a tenth of the goals' radius (inferred to equal θ^a; the caption
+    of Figure 2 has θ^g).
     """
 
     max_iterations: int = 20_000
-    """Largest number of iterations of the corrective process for a goal (our bound). A trial that
-    needs more iterations fails."""
+    """Largest number of iterations of the corrective process for one correction (our bound). A
+    trial fails if a correction needs more iterations."""
 
     motor_noise: float = 0.0
-    """s: standard deviation of the distance by which a movement misses its target, in length units
-    (base) and rad (joints). The paper's robot has no motor noise. ``docs/model.md`` has the
-    rule."""
+    """s: standard deviation of the Gaussian noise that displaces each coordinate of a movement's
+    target, in length units (base) and rad (joints). The paper's robot has no motor noise. The rule
+    is in ``docs/model.md``, section *Motor noise*."""
 
     norm: Norm = "euclidean"
     """Norm of joint space in which a step has the length ``step``:
@@ -130,14 +132,15 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
     model : MotionModel
     radius : float, optional
         Radius of the goals (in length units). If it is passed, ``correction_tolerance`` must be
-        smaller.
+        smaller than the radius.
 
     Raises
     ------
     TypeError
         ``model`` is not a MotionModel.
     ValueError
-        A constant is out of bounds, or ``correction_tolerance`` is not below ``radius``.
+        A constant has a wrong type or is out of bounds, or ``correction_tolerance`` is not below
+        ``radius``.
     """
     if not isinstance(model, MotionModel):
         raise TypeError(f"model is {brief_value(model)}; it must be a MotionModel")
@@ -198,7 +201,7 @@ def model_from(constants: MotionModel | Mapping[str, Any]) -> MotionModel:
     TypeError
         ``constants`` is neither a mapping nor a MotionModel.
     ValueError
-        A constant is unknown or out of bounds.
+        A constant is unknown, has a wrong type or is out of bounds.
 
     Examples
     --------
@@ -224,7 +227,9 @@ def same_world(first: MotionModel, second: MotionModel, radius: float) -> bool:
 
 
 def differences(model: MotionModel) -> dict[str, Any]:
-    """Return a dict of the constants in :data:`WORLD` that differ from the paper's values.
+    """Return the constants in :data:`WORLD` that differ from the paper's values.
+
+    The result is a dict that maps the name of each such constant to its value in ``model``.
 
     Examples
     --------

@@ -36,7 +36,8 @@ Points = NDArray[np.float64]
 Hands = NDArray[np.int64]
 """Hands as indices in :data:`HANDS`: 0 left, 1 right."""
 MAX_ENTRY = 1e5
-"""Largest entry of a configuration or goal, in length units or rad."""
+"""Largest absolute value of an entry of a configuration or goal for which movements are computed,
+in length units or rad."""
 MAX_NUMBER = 1e4  # largest number in a task or a robot, in length units or rad
 MAX_LINKS = 100  # of an arm
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MAX_NUMBER, le=MAX_NUMBER)]
@@ -48,7 +49,7 @@ BASE_DOF = 2
 
 
 class Arm(NamedTuple):
-    """An arm of a robot as the formulas and the compiled kernels read it."""
+    """Geometry of an arm, in the form that the formulas and the compiled kernels read."""
 
     first_joint: int
     """Index in ``q`` of the angle of the arm's first joint."""
@@ -66,7 +67,8 @@ def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
     Parameters
     ----------
     q : array or sequence, shape (dof, ...)
-        One configuration or many, of numbers or symbols; the first axis is the entry.
+        One configuration or many, of numbers or symbols. The first axis runs over the entries of a
+        configuration.
     arm : Arm
         The arm, with n links.
     xs, ys : array or list, length n + 1
@@ -118,8 +120,9 @@ class Robot:
     """Geometry and kinematics of a planar robot with two arms, by default the paper's.
 
     The paper publishes four links of length 1 for each arm and a box 1 wide and 0.2 high (Figure
-    1). That the shoulders are on the top corners of the box is inferred: only a height of +0.1
-    gives the published initial rewards of the one-armed tasks (docs/model.md).
+    1). That the shoulders are on the top corners of the box is inferred: of the heights -0.1, 0 and
+    +0.1, only +0.1 gives the initial rewards of the one-armed tasks that follow from the paper
+    (docs/model.md).
 
     A configuration ``q`` has shape ``(dof,)``: x and y of the base (in length units), the joint
     angles of the left arm and the joint angles of the right arm (in rad, each measured from the
@@ -142,7 +145,7 @@ class Robot:
 
     @cached_property
     def scale(self) -> float:
-        """Scale of drawings: length of the shorter arm as a multiple of the paper's.
+        """Scale of drawings: the length of the shorter arm divided by 4.
 
         The paper's arms have length 4.
         """
@@ -320,7 +323,7 @@ class Robot:
         return self._hand(xs, ys, array), result
 
     def base_outline(self, q: ArrayLike) -> Array:
-        """Return the positions of the four corners of the base, as it is drawn.
+        """Return the positions of the four corners of the drawn base (:attr:`drawn_base`).
 
         Parameters
         ----------
@@ -422,9 +425,9 @@ class Robot:
 
     @staticmethod
     def _hand(xs: list[Any], ys: list[Any], q: Array) -> Array:
-        """Return the positions of a hand: the last entries of ``xs`` and ``ys``.
+        """Return the positions of a hand, which are the last entries of ``xs`` and ``ys``.
 
-        The result has shape ``(..., 2)`` for configurations ``q`` of shape ``(..., dof)``.
+        For configurations ``q`` of shape ``(..., dof)`` the result has shape ``(..., 2)``.
         """
         position = np.empty((*q.shape[:-1], 2))
         position[..., 0], position[..., 1] = xs[-1], ys[-1]

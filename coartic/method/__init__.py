@@ -2,9 +2,10 @@
 
 Each learner, planner or controller is a :class:`Method`. A method declares its facts, its
 parameters and the **information** that it uses. Its function ``solve`` gets a :class:`Session` (one
-task, one seed and one meter) and returns a solution. The session is the only access to the robot.
-It counts trials and evaluations, and refuses a call that uses undeclared information. The benchmark
-itself executes, scores and verifies the solution.
+task, one seed and one meter) and returns a :class:`Result` with the solution. The session counts
+trials and evaluations, and refuses a call that uses undeclared information. A method that does not
+belong to this project must use the robot only through its session. The benchmark itself executes,
+scores and verifies the solution.
 """
 
 from coartic.method.base import (

@@ -27,8 +27,8 @@ from coartic.tasks.task import INITIAL_POLICIES, Task
 TRIALS = 10_000
 """Number of trials of a run by default (published)."""
 CORRECTIONS_BY_TENTH = "corrections"
-"""Key in the details of a learner's result: the numbers of corrective movements in trial 0 and in
-each tenth of the later trials."""
+"""Key in the details of a learner's result. The value is a list of 11 numbers of corrective
+movements: in trial 0, and in each tenth of the later trials."""
 
 
 @describe_validation_errors
@@ -46,7 +46,7 @@ class Result:
     """Movements, at least one for each goal, in the order of the goals. With motor noise they are
     the movements that the method recommends to make next (:func:`answer_of`)."""
     details: dict[str, Any] = field(default_factory=dict)
-    """Plain data to be stored with the solution, but never its score."""
+    """Plain data that are stored with the solution. They have no effect on its score."""
     initial: tuple[Movement, ...] = ()
     """Movements of a learner's first trial; empty if that trial failed, and for other methods."""
     replay: tuple[Movement, ...] = ()
@@ -57,11 +57,11 @@ class Result:
 def answer_of(result: Result, model: MotionModel) -> Result:
     """Return the part of a method's result that is judged under a motion model.
 
-    Without motor noise this is the result itself. With motor noise it is a copy of the result:
+    Without motor noise this is the result itself. With motor noise it is a copy with these changes:
 
-    - The movements of the solution have no ticks, and corrective movements have no targets
-      (:func:`.next_action`), because both come from a single draw of the noise.
-    - The first trial and the replay are left out for the same reason.
+    - The movements of the solution have no ticks, and corrective movements have no targets, because
+      both depend on a single draw of the noise (:func:`coartic.motion.solution.next_action`).
+    - ``initial`` and ``replay`` are empty for the same reason.
 
     Examples
     --------
@@ -89,8 +89,7 @@ class Outline(NamedTuple):
     hands: tuple[Hand, ...]
     """Hands that may hit goals: ``"left"``, ``"right"`` or both."""
     initial_hands: str
-    """Hand sequence of the task for a first solution, such as ``"RRRR"``, or the policy that finds
-    one."""
+    """Hand sequence of trial 0, such as ``"RRRR"``, or the policy that finds one."""
 
     @property
     def initial_is_policy(self) -> bool:
@@ -113,7 +112,7 @@ def outline_of(task: Task) -> Outline:
 class Facts:
     """Citations and names of a method for figures, tables and the bibliography.
 
-    Raises ValueError for a wrong value.
+    Raises ValueError if a field has a wrong type, or if ``short`` is too long.
 
     Examples
     --------
@@ -122,18 +121,19 @@ class Facts:
     """
 
     works: tuple[str, ...] = ()
-    """Keys in ``analysis/references.bib`` of the works from which the method comes, the most
-    important first."""
+    """Keys in ``analysis/references.bib`` of the works that describe the method, the most important
+    first."""
     solvers: tuple[str, ...] = ()
     """Keys in ``analysis/references.bib`` of the works on the solvers that the method uses."""
     algorithm: str = ""
-    """Name of the algorithm that the method implements; by default the method's own name. A ranking
-    counts algorithms."""
+    """Name of the algorithm that the method implements; several methods can implement the same
+    algorithm. By default it is the title of a built-in method, and the id of a method from a
+    file."""
     short: Annotated[str, Field(max_length=22)] = ""
-    """Name in figures of one column, at most 22 letters. By default it is the title of a built-in
+    """Name in narrow figures, at most 22 characters. By default it is the title of a built-in
     method, and the id of a method from a file."""
     headline: bool = True
-    """True if the method represents its algorithm where a table or figure names only some
+    """True if the method represents its algorithm in tables and figures that contain only some
     methods."""
     ablation_of: str = ""
     """Id of the method of which this method is an ablation."""
@@ -147,7 +147,7 @@ class Method(ABC):
     """
 
     name: ClassVar[str]
-    """Id, such as ``"random-search"``. The id of another form of the same method adds ``/form``."""
+    """Id, such as ``"random-search"``. Forms of one method have ids such as ``"cma-es/bandit"``."""
     title: ClassVar[str]
     """Name in figures and tables."""
     facts: ClassVar[Facts] = Facts()
@@ -162,7 +162,8 @@ class Method(ABC):
     is not a part of the id of a run."""
     adapts_to: ClassVar[frozenset[str] | None] = None
     """Constants of the motion model (:data:`.WORLD`: ``motor_noise``, ``norm`` and ``base_weight``)
-    that may differ from the paper's when the method runs. None, the default, stands for
+    that may differ from the paper's when the method runs. ``motor_noise`` may always differ. None,
+    the default, stands for
 
     - only ``motor_noise``, if the method declares the reward formula or the kinematic model,
       because such a method may itself compute lengths as in the paper;
@@ -189,7 +190,7 @@ class Method(ABC):
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
     def inapplicable_reason(self, task: Outline) -> str | None:
-        """Return why the method does not apply to a task; None if it applies.
+        """Return a sentence on why the method does not apply to a task, or None.
 
         By default a method applies to every task.
         """
@@ -197,7 +198,11 @@ class Method(ABC):
 
     @classmethod
     def refuses(cls, model: MotionModel) -> str | None:
-        """Return why the method cannot run under a motion model; None if it can."""
+        """Return a sentence on why the method cannot run under a motion model, or None.
+
+        The sentence names the first constant that differs from the paper's and is not in
+        :attr:`adapts_to`.
+        """
         adapts_to = cls.adapts_to
         if adapts_to is None:
             knows = {Information.REWARD_FORMULA, Information.KINEMATIC_MODEL} & cls.information
@@ -226,8 +231,8 @@ class Method(ABC):
             The solution, with at least one movement for each goal, and further data to be stored.
             With motor noise (``session.model.motor_noise`` above 0) the reward of the best trial is
             partly luck. The solution then consists of the movements that the method recommends to
-            make next. These movements are judged on draws of the noise that the method has not
-            seen.
+            make next. These movements are judged on draws of the noise that occurred in none of the
+            method's trials.
 
         Raises
         ------
@@ -242,8 +247,8 @@ class Method(ABC):
     def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`.
 
-        For methods that do not belong to this project, a suite ignores this number, and always
-        passes one session at a time, to :meth:`solve`.
+        The number matters only for methods of this project. For any other method, a suite calls
+        :meth:`solve` with one session at a time.
         """
         return 1
 
@@ -284,9 +289,9 @@ MODULES = (
     "coartic.baselines.optimum",
     "coartic.baselines.policy_gradient",
 )
-"""Modules of the built-in methods, in the order of lists and figures. Each module has a list
-``METHODS``. Add a new module at the end, so that the other methods keep their colours and
-markers."""
+"""Modules of the built-in methods, in the order of lists and figures. Each module has a sequence
+``METHODS`` of classes. Add a new module at the end, so that the other methods keep their colours
+and markers."""
 
 
 @cache
@@ -304,9 +309,10 @@ def run_method(
 ) -> tuple[Result, Session]:
     """Let a method solve a task in this process.
 
-    There is no trial budget, and the solution is not executed. Methods of this project may see the
-    task itself, and report their own counts. Any other method works only through its session, which
-    raises UndeclaredError if it detects the use of undeclared information (:data:`METERED`).
+    The session has no trial budget, and the solution is not executed. Methods of this project may
+    see the task itself, and report their own counts. Any other method must work only through its
+    session. The session raises UndeclaredError if it detects the use of undeclared information
+    (:data:`METERED`).
 
     Parameters
     ----------
@@ -335,9 +341,10 @@ def run_method(
     SolutionError
         The solution is not a sequence.
     TaskError, TypeError
-        The task cannot be used, or has a wrong type.
+        The task cannot be used, or ``task`` or ``model`` has a wrong type.
     ValueError
-        The seed is not an integer from 0 to 2^128 - 1.
+        The seed is not an integer from 0 to 2^128 - 1, or a constant of the model is out of bounds
+        or does not fit the radius of the goals.
     """
     chosen = as_task(task)
     check_model(model, radius=chosen.radius)

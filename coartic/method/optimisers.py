@@ -1,7 +1,7 @@
 """Black-box optimisation: the cost of a trial as a function to minimise.
 
-:func:`objective` makes the function of a task for scipy and similar libraries. An
-:class:`Optimiser` is a method of the benchmark that minimises such a function.
+:func:`objective` makes the function of a task for scipy and similar libraries.
+:class:`Optimiser` is the base class of methods of the benchmark that minimise such a function.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def explored_joints(session: Session) -> NDArray[np.bool_]:
     """Return a mask of the entries of a configuration that optimisers explore.
 
     The mask is a bool array, shape ``(dof,)``. It is True for the base coordinates that are not
-    locked, and for the joints of the arms whose hands the session's task uses.
+    locked, and for the joints of the arms whose hands may hit goals.
     """
     mask = np.zeros(session.dof, dtype=np.bool_)
     mask[:2] = [coordinate not in session.locked_base for coordinate in "xy"]
@@ -79,9 +79,9 @@ def explored_joints(session: Session) -> NDArray[np.bool_]:
 def sequences_of(session: Session) -> list[str]:
     """List all hand sequences of the session's task, such as ``"RRLR"``.
 
-    The order is alphabetical, except that a hand sequence that the task names comes first. If there
-    are more than 4096 sequences, the list contains only the initial hand sequence, which comes from
-    :meth:`Session.find_initial_hands`. The errors of that function are raised.
+    The order is alphabetical, except that the initial hand sequence comes first if the task names
+    one. If there are more than 4096 sequences, the list contains only the result of
+    :meth:`.Session.find_initial_hands`; the errors of that function are raised.
     """
     if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
         return [session.find_initial_hands()]
@@ -101,9 +101,9 @@ def _entries_of(name: str, points: ArrayLike) -> Array:
 class Objective:
     """The cost of a trial (its ticks) as a function of its target configurations.
 
-    A point is a vector of ``dim`` numbers, in length units (base) and rad (joints). For each goal
-    in turn, it contains the target of each explored entry of a configuration
-    (:func:`explored_joints`).
+    A point is a vector of ``dim`` numbers, in length units (base) and rad (joints). It consists of
+    one part for each goal, in the order of the goals. A part contains the target of each explored
+    entry of a configuration (:func:`.explored_joints`).
 
     - The cost of a point is minus the reward of its trial, or ``FAILED`` if the trial fails or
       takes more than ``FAILED`` ticks.
@@ -112,17 +112,18 @@ class Objective:
     - If all entries of a goal are NaN, there is no movement to a target: only the corrective
       process acts. If the hand is in the goal already, this costs no ticks, whereas a movement to a
       target takes at least one tick.
-    - A trial fails if its point has an entry beyond 100,000.
+    - A trial fails if its point has an entry beyond ±100,000.
     - With motor noise the cost of a point differs from trial to trial. :attr:`best_cost` is the
       lowest of many noisy costs, and therefore partly luck. To compare points fairly, evaluate them
       with the same noise draws (:meth:`many`).
 
     The constructor makes the first trials, in which only the corrective process acts: one trial
-    with ``hands``, or one trial with each sequence of :func:`sequences_of` until the budget is used
-    up. The best of these sequences becomes :attr:`hands`, the default hand sequence of all points.
+    with ``hands``, or one trial with each sequence of :func:`.sequences_of` until the budget is
+    used up. The sequence with the highest reward becomes :attr:`hands`, the default hand sequence
+    of all points.
 
-    Threads can share an objective; their calls are executed one after the other. Copying an
-    objective, or using it in a forked process, raises CoarticError, because trials of a copy or of
+    Threads can share an objective; their trials are made one after the other. Copying an objective,
+    or evaluating it in a forked process, raises CoarticError, because trials of a copy or of
     another process would not be subtracted from the budget.
 
     Parameters
@@ -130,8 +131,8 @@ class Objective:
     session : Session
         Session in which the trials are made and counted.
     hands : str, optional
-        Hand sequence of the first trial, such as ``"RRLR"``. By default the sequences of
-        :func:`sequences_of` are tried, and the best one is used.
+        Hand sequence of the first trial and of points, such as ``"RRLR"``. By default the sequences
+        of :func:`.sequences_of` are tried, and the one with the highest reward is used.
     half_width : float
         Half the width of the bounds around ``x0``, in length units (base) and rad (joints).
     trials : int, optional
@@ -147,6 +148,8 @@ class Objective:
         No trial is left.
     NotApplicableError
         There are more than 4096 hand sequences, and no initial one is found.
+    UndeclaredError
+        The session's information does not include :data:`.OPTIMISER_INFORMATION`.
     ValueError
         ``hands`` do not fit the task, or ``half_width`` is not from 1e-9 to 100.
     """
@@ -198,7 +201,8 @@ class Objective:
         self.dim = len(self._entries)
         """Number of entries of a point."""
         self.bounds: Array = self.x0[:, None] + np.array([-half_width, half_width])
-        """A box to search in, shape ``(dim, 2)``; points outside the box are evaluated as well."""
+        """Lower and upper ends of a box to search in, shape ``(dim, 2)``, in length units and rad.
+        Points outside the box can be evaluated as well."""
         self._evaluations = 0
         self._best_cost = float(min(-outcomes.rewards[best], FAILED))
         self._best_hands = self.hands
@@ -236,10 +240,12 @@ class Objective:
         """Lowest known cost of a solution of the task (in ticks), or None.
 
         The solution may have any hand sequence, and may hit goals without a movement. With motor
-        noise the cost is a mean. The result is None if no such cost is shipped with coartic, as for
+        noise the cost is a mean over executions. The result is None if no such cost is shipped with
+        coartic, as for
 
         - most tasks of your own;
-        - instances of families, except the first 40 test instances of shipped families;
+        - instances of families, except the first 40 test instances of shipped families (with motor
+          noise, only of families with up to eight goals);
         - motion models other than the paper's model and the paper's model with motor noise 0.01.
 
         Raises UndeclaredError in a method, as :attr:`task` does.
@@ -269,10 +275,9 @@ class Objective:
 
     @property
     def evaluations(self) -> int:
-        """Number of points evaluated.
+        """Number of points evaluated so far.
 
-        The first trials, one for each hand sequence tried, in which only the corrective process
-        acts, are not counted.
+        The first trials, in which only the corrective process acts, are not counted.
         """
         return self._evaluations
 
@@ -304,9 +309,9 @@ class Objective:
     def history(self) -> pd.DataFrame:
         """Table with a row for each improvement of the best cost.
 
-        The first row is the best trial in which only the corrective process acts. Column
-        ``evaluations`` is the number of evaluations made until then (0 in the first row); column
-        ``cost`` is the cost (in ticks).
+        Column ``cost`` is the new best cost (in ticks). Column ``evaluations`` is the number of the
+        evaluation that had this cost, from 1. The first row is the best of the first trials, in
+        which only the corrective process acts; its number is 0.
         """
         import pandas as pd  # workers do not import pandas
 
@@ -323,14 +328,15 @@ class Objective:
         Returns
         -------
         float or ndarray
-            Number of evaluations until the best cost was at or below each target. The number is
-            infinite if no point has reached the target so far. The result is a float if ``targets``
-            is a number, otherwise an array of the same shape.
+            Number of evaluations until the best cost was at or below each target; 0 if the
+            corrective process on its own reached it, and infinity if it has not been reached so
+            far. The result is a float if ``targets`` is a number, otherwise an array of the same
+            shape.
 
         Raises
         ------
         ValueError
-            A target is not from 0 to ``FAILED``.
+            A target is not a number from 0 to ``FAILED``.
         """
         target_costs = real_array("targets", targets)
         if not ((target_costs >= 0) & (target_costs <= FAILED)).all():
@@ -346,9 +352,9 @@ class Objective:
     def x0(self) -> Array:
         """A starting point for a search, shape ``(dim,)``, in length units and rad.
 
-        The corrective process on its own, with :attr:`hands`, hits the goals in certain
-        configurations; the starting point consists of the explored entries of these configurations.
-        Each access returns a new array.
+        The starting point consists of the explored entries of :attr:`configurations`, in which the
+        corrective process on its own hits the goals with :attr:`hands`. Each access returns a new
+        array.
         """
         return self.configurations[self.joints].copy()
 
@@ -356,8 +362,8 @@ class Objective:
     def best_x(self) -> Array:
         """A copy of the point of the best trial so far, shape ``(dim,)``.
 
-        With the hands :attr:`best_hands` this point costs :attr:`best_cost`. All entries are NaN
-        until a point is better than the corrective process on its own.
+        In its trial, with the hands :attr:`best_hands`, this point cost :attr:`best_cost`. All
+        entries are NaN until a point is better than the corrective process on its own.
         """
         return self._best_x.copy()
 
@@ -386,20 +392,20 @@ class Objective:
         Returns
         -------
         tuple of Movement
-            A movement for each goal. A movement has no target if the entries of its goal are NaN.
-            Otherwise the target has entries for all joints. The entry of a joint that the point
-            does not include is
+            A movement for each goal. A movement has no target if all entries of its goal are NaN.
+            Otherwise the target has an entry for each entry of a configuration. For entries that
+            are not in the point, it is
 
-            - the value of the joint when the movement begins;
-            - the value of the joint at the start of the trial, in the targets of goals after a goal
-              at which the trial fails;
-            - NaN with motor noise (a joint whose target is NaN does not move).
+            - without motor noise, the value of the coordinate when the movement begins;
+            - without motor noise, for goals after a goal at which the trial fails, the value of the
+              coordinate at the start of the trial;
+            - with motor noise, NaN (a coordinate whose target is NaN does not move).
 
         Raises
         ------
         UndeclaredError
-            A method made the call, and the model has no motor noise. A method can use
-            :attr:`solution` instead.
+            The model has no motor noise, and the objective is that of a method, which cannot see
+            its task. The method can use :attr:`solution` instead.
         ValueError
             ``x`` or ``hands`` does not fit.
         """
@@ -476,14 +482,12 @@ class Objective:
     ) -> Array:
         """Make a trial for each of many points, and return the costs (in ticks).
 
-        The trials are made side by side.
-
         Parameters
         ----------
         points : array_like, shape (N, dim)
-            Points as rows. Entries are finite. For a goal at which only the corrective process is
-            to act, all entries are NaN. Joints without an entry in a point keep still. A trial with
-            an entry beyond 100,000 fails.
+            Points as rows. Entries are finite, except that all entries of a goal are NaN if only
+            the corrective process is to act at this goal. Coordinates that are not in a point do
+            not move. A trial with an entry beyond ±100,000 fails.
         hands : str or sequence of str, optional
             One hand sequence for all points (``"RRLR"``), or a sequence for each; by default
             :attr:`hands`.
@@ -510,7 +514,8 @@ class Objective:
             - ``points`` has the wrong shape;
             - an entry is infinite;
             - a goal has both NaN and other entries;
-            - ``hands`` do not fit the task.
+            - ``hands`` do not fit the task, or their number is not N;
+            - ``draws`` are not N integers from 0 to 2^53.
         """
         array = _entries_of("points", points)
         if array.ndim != 2 or array.shape[1] != self.dim:
@@ -549,10 +554,11 @@ class Objective:
         records: TrialRecords,
         trial: int,
     ) -> None:
-        """Note a point as the best so far.
+        """Store a point as the best so far.
 
-        ``cost`` is in ticks, and ``codes``, shape ``(G,)``, are the hands of the point. The point
-        is evaluation number ``evaluations`` (from 1), and trial ``trial`` (from 0) of ``records``.
+        ``cost`` is in ticks, and ``codes``, shape ``(G,)``, are the hands of the point (0 left, 1
+        right). The number of its evaluation is ``evaluations``, from 1. The number of its trial in
+        ``records`` is ``trial``, from 0.
         """
         self._best_cost, self._best_x = cost, point.copy()
         if self._session.model.motor_noise > 0.0:  # a joint that keeps still has no noise
@@ -570,9 +576,9 @@ class Objective:
         return records.goals["target"][trial, :, 0, : self._session.dof].copy()
 
     def _targets_of(self, points: Array) -> Configs:
-        """Return the targets of points ``(N, dim)``, shape ``(N, G, dof)``.
+        """Convert points, shape ``(N, dim)``, to targets, shape ``(N, G, dof)``.
 
-        Targets are in length units and rad, and NaN for joints without an entry in a point.
+        Targets are in length units and rad, and NaN for coordinates that are not in a point.
         """
         targets = np.repeat(self._targets, len(points), axis=0)
         targets.reshape(len(points), -1)[:, self._entries] = points
@@ -631,8 +637,8 @@ def objective(
     task : Task, str or pathlib.Path
     hands : str, optional
         A hand sequence (``"RRLR"``), by default the sequence for which the corrective process on
-        its own gets the highest reward. The optimum can be reached with another hand sequence, as
-        in ``two-armed-2``.
+        its own gets the highest reward. The optimum can have another hand sequence, as in task
+        ``two-armed-2``.
     half_width : float
         Half the width of the bounds around ``x0``, in length units (base) and rad (joints).
     model : MotionModel
@@ -646,7 +652,7 @@ def objective(
     Returns
     -------
     Objective
-        The function, which remembers its best point.
+        The function, which stores its best point.
 
     Raises
     ------
@@ -662,7 +668,7 @@ def objective(
         - ``budget`` is not from 1 to 10,000,000, or is smaller than the number of hand sequences to
           try.
     TypeError
-        The model is not a MotionModel, or the task is not a Task, a string or a path.
+        The task is not a Task, a string or a path.
     MethodError
         The corrective process completes none of the sequences tried, or there are more than 4096
         sequences to try.
@@ -689,11 +695,12 @@ class OptimiserParameters(Parameters):
     """Parameters of all optimisers."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Largest number of trials of a run, including those with only the corrective process."""
+    """Largest number of trials of a run, including the first trials, in which only the corrective
+    process acts."""
     hands: str | None = None
     """Hand sequence, such as ``"RRLR"``. By default it is the sequence for which the corrective
-    process on its own gets the highest reward, or the task's initial one if there are more than
-    4096."""
+    process on its own gets the highest reward, or the task's initial sequence if there are more
+    than 4096 sequences."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
     """Half the width of the bounds, in length units (base) and rad (joints)."""
 
@@ -701,7 +708,8 @@ class OptimiserParameters(Parameters):
 class Optimiser(Method):
     """Base class of methods that minimise the cost of a trial.
 
-    A subclass sets ``name``, ``title`` and ``citation``, and implements :meth:`optimise`.
+    A subclass sets ``name`` and ``title``, names its works in ``facts`` or ``citation``, and
+    implements :meth:`optimise`.
     """
 
     information = OPTIMISER_INFORMATION
@@ -710,8 +718,8 @@ class Optimiser(Method):
     def solve(self, session: Session) -> Result:
         """Call :meth:`optimise` until it returns or no trial is left; return the best trial.
 
-        With motor noise, return the movements of the point that :meth:`optimise` recommends. If
-        :meth:`optimise` recommends no point, return the best trial, whose reward is partly luck.
+        With motor noise, return instead the movements of the point that :meth:`optimise`
+        recommends, if it recommends one.
 
         Raises
         ------
@@ -722,7 +730,7 @@ class Optimiser(Method):
             There are more than 4096 hand sequences, and no initial one is found.
         ValueError
             Parameter ``hands`` does not fit the task. With motor noise: :meth:`optimise` returned
-            neither a point nor None.
+            anything else than a point, a tuple of a point and its hands, or None.
         """
         parameters: OptimiserParameters = self.parameters
         try:
@@ -761,8 +769,8 @@ class Optimiser(Method):
         Parameters
         ----------
         objective : Objective
-            The cost function, which remembers its best trial. It raises BudgetError when no trial
-            is left, which ends the run.
+            The cost function, which stores its best trial. When no trial is left, an evaluation
+            raises BudgetError, which ends the run.
         rng : numpy.random.Generator
             The session's random generator.
 
@@ -771,8 +779,8 @@ class Optimiser(Method):
         array_like, shape (dim,), or tuple, or None
             The point that the method recommends, such as the mean of an evolution strategy; or a
             tuple of the point and its hand sequence, if the sequence is not
-            :attr:`Objective.hands`. The returned point is the solution only with motor noise,
-            because there the reward of the best trial is partly luck. Without noise, or if None is
+            :attr:`Objective.hands`. With motor noise the returned point is the solution, because
+            the reward of the best trial is partly luck. Without motor noise, or if None is
             returned, the best trial is the solution.
 
         Notes

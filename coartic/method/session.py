@@ -53,18 +53,19 @@ class Information(StrEnum):
     JACOBIAN = "Jacobian"
     """Derivative of a hand's position with respect to the entries of a configuration."""
     CORRECTIVE_PROCESS = "corrective process"
-    """A configuration that hits a goal, found by the corrective process **A**, which uses goal and
-    Jacobian."""
+    """A configuration that hits a goal, which the corrective process **A** finds from the goal and
+    the Jacobian."""
     REWARD_BY_TRIAL = "reward by trial"
-    """The total reward of a trial after the trial is made."""
+    """The total reward of a trial, after the trial is made."""
     REWARD_BY_SUBTASK = "reward by subtask"
-    """Reward of each goal of a trial, after the trial is made."""
+    """The reward for each goal of a trial, after the trial is made."""
     KINEMATIC_MODEL = "kinematic model"
     """The kinematics as formulas, with all derivatives."""
     NOISE_DRAWS = "draws of the noise"
     """The choice of the noise draw of each trial. By default trial k has draw k."""
     REWARD_FORMULA = "reward as a formula"
-    """The rule that a movement costs reward in proportion to its path in joint space."""
+    """The rule that a movement costs reward in proportion to the length of its path in joint
+    space."""
     SECONDARY_OBJECTIVES = "secondary objectives"
     """Objectives beyond hitting the goals, such as smoothness."""
 
@@ -80,7 +81,7 @@ METERED = frozenset(
         Information.NOISE_DRAWS,
     }
 )
-"""Information whose use a session can detect. The use of other information is declared, but not
+"""Information whose use a session can detect. Other information is declared, but its use is not
 checked."""
 
 
@@ -122,21 +123,21 @@ class Meter:
     """Physical trials, including failed trials."""
     initial_trials: int = 0
     """Trials of the search for the initial hands, if the task names a policy. These trials are not
-    counted in ``trials``, but their ticks, corrections and evaluations are included in the counts
-    below."""
+    counted in ``trials`` and ``failed_trials``, but their ticks, corrections, iterations and
+    evaluations are included in the counts below."""
     movement_ticks: int = 0
-    """Control ticks of all trials."""
+    """Control ticks of all trials, including ``initial_trials``."""
     forward_kinematics: int = 0
     """Forward-kinematics evaluations, one per configuration. Compiled kernels skip steps that
-    cannot end a movement, and do not count them."""
+    cannot end a movement; these steps are not counted."""
     jacobians: int = 0
-    """Jacobian evaluations; the corrective process makes one per iteration."""
+    """Jacobian evaluations. The corrective process makes one per iteration."""
     corrective_iterations: int = 0
     """Iterations of the corrective process."""
     corrections: int = 0
     """Corrective movements made."""
     failed_trials: int = 0
-    """Trials that did not hit every goal."""
+    """Number of ``trials`` that did not hit every goal."""
     gradients: int = 0
     """Gradient evaluations of a solver."""
     hessians: int = 0
@@ -144,9 +145,9 @@ class Meter:
     solver_iterations: int = 0
     """Iterations of a solver."""
     build_s: float = 0.0
-    """Wall time of setting up problems (in s). Each problem is set up once."""
+    """Wall time of setting up problems (in s)."""
     solve_s: float = 0.0
-    """Wall time of solving problems (in s)."""
+    """Wall time of solving problems, or of learning (in s)."""
 
     COUNTS: ClassVar[tuple[str, ...]]
     """Names of all counters except the times."""
@@ -158,11 +159,11 @@ class Meter:
         "hessians",
         "solver_iterations",
     )
-    """Counters to which a method may add (:meth:`Session.spend`): the evaluations of its own solver
-    or of its own corrective process, with one Jacobian per iteration."""
+    """Counters to which a method may add (:meth:`Session.spend`): the evaluations and iterations of
+    its own solver or of its own corrective process."""
 
     def add(self, **counts: int) -> None:
-        """Add each count to the counter of that name, in place.
+        """Add counts to the counters with the names of the keyword arguments, in place.
 
         Signs, sums and budgets are not checked.
         """
@@ -189,10 +190,12 @@ def _pack_rewards(rewards: Iterable[int | None]) -> array[int]:
 class Session:
     """The task, the seed and the meter with which a method works.
 
-    The declaration is enforced: a call raises UndeclaredError if it uses information that is in
-    :data:`METERED` but not in ``information``. Trials and evaluations are counted. A session is not
-    a sandbox. Threads can share a session: they make trials one after the other, from the same
-    budget. In a forked process a call that needs declared information raises CoarticError.
+    - A call raises UndeclaredError if it uses information that is in :data:`METERED` but not in
+      ``information``. A session is not a sandbox: it cannot keep a method from reading the task
+      by other means.
+    - Trials and evaluations are counted.
+    - Threads can share a session: they make trials one after the other, from the same budget.
+    - In a forked process, a call that needs declared information raises CoarticError.
 
     Parameters
     ----------
@@ -201,16 +204,17 @@ class Session:
     information : iterable of Information
         The information that the method declares.
     model : MotionModel
-        The motion model of the trials. The seed of its motor noise is derived from ``seed``; the
-        random numbers of :attr:`rng` are independent of the noise.
+        The motion model of the trials. The seed of its motor noise is derived from ``seed``. The
+        random numbers of the attribute ``rng``, a NumPy generator with seed ``seed``, are
+        independent of the noise.
     trial_budget : int, optional
         Largest number of trials; None for no limit.
     trusted : bool
-        True for methods of this project. They may also get the task for their compiled kernels, and
-        set the counts themselves.
+        True for methods of this project. They may also get the task for their compiled kernels
+        (:meth:`reveal`), and add to all counters (:meth:`spend`).
     of_run : bool
-        True for the session of a run. Trials outside such sessions are counted separately for each
-        process (:func:`coartic.motion.trials.trials_outside`).
+        True for the session of a run. Trials outside such sessions are counted in each process
+        (:func:`coartic.motion.trials.trials_outside`).
     """
 
     def __init__(
@@ -277,9 +281,9 @@ class Session:
         return self._task.robot.dof
 
     def joints(self, hand: Hand) -> slice:
-        """Return the slice of a configuration with the angles of a hand's arm (in rad).
+        """Return the slice of a configuration with the joint angles of a hand's arm.
 
-        Raises ValueError for an unknown hand.
+        The angles are in rad. Raises ValueError for an unknown hand.
         """
         return self._task.robot.joints(hand)
 
@@ -307,8 +311,8 @@ class Session:
     def robot(self) -> Robot:
         """The robot with the lengths of its links and the positions of its shoulders.
 
-        The session does not count evaluations by this object: add them by :meth:`spend`. Raises
-        UndeclaredError without ``Information.KINEMATIC_MODEL``.
+        The session does not count evaluations that the method makes with this object: add them by
+        :meth:`spend`. Raises UndeclaredError without ``Information.KINEMATIC_MODEL``.
         """
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot
@@ -347,8 +351,8 @@ class Session:
         """Check that a solution uses only declared information, and note it in :attr:`used`.
 
         A corrective movement without a target uses the corrective process. Raises UndeclaredError
-        if the method does not declare the corrective process, and SolutionError if the solution is
-        not a sequence.
+        if there is such a movement and the method does not declare the corrective process. Raises
+        SolutionError if the solution is not a sequence.
         """
         if not isinstance(solution, Sequence):
             raise SolutionError(f"the solution is {brief_value(solution)}; it must be a list")
@@ -371,7 +375,7 @@ class Session:
     # Calls that the session counts.
 
     def forward_kinematics(self, q: Any, hand: Hand) -> Array:
-        """Return positions of a hand, and count an evaluation for each.
+        """Return positions of a hand, and count one evaluation for each of them.
 
         Parameters
         ----------
@@ -396,7 +400,7 @@ class Session:
         return positions
 
     def jacobian(self, q: Any, hand: Hand) -> Array:
-        """Return Jacobians of a hand's position, and count each of them.
+        """Return Jacobians of a hand's position, and count one evaluation for each of them.
 
         Parameters
         ----------
@@ -424,7 +428,8 @@ class Session:
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
         """Run the corrective process for a goal, and count its evaluations.
 
-        No movement is made. Iterations, Jacobians and forward-kinematics evaluations are counted.
+        The robot does not move. Iterations, Jacobians and forward-kinematics evaluations are
+        counted.
 
         Parameters
         ----------
@@ -444,7 +449,8 @@ class Session:
         UndeclaredError
             ``Information.CORRECTIVE_PROCESS`` is not declared.
         ValueError
-            The task does not have the goal, or ``q`` or ``hand`` does not fit the robot.
+            The task does not have the goal, ``q`` or ``hand`` does not fit the robot, or a constant
+            of the session's model is out of bounds.
         """
         self._use(Information.CORRECTIVE_PROCESS)
         check_limits("goal", goal, 1, self.goals_count)
@@ -468,7 +474,7 @@ class Session:
 
         The ticks, evaluations, iterations and corrections of the trial are counted as well. If a
         goal is missed, the corrective process acts, and the ticks of its movement are part of the
-        reward. With motor noise, trial k is made with draw k of the noise.
+        reward. With motor noise, trial k of the session (from 0) is made with draw k of the noise.
 
         Parameters
         ----------
@@ -527,24 +533,24 @@ class Session:
         hands : str or sequence of str
             One hand sequence for all trials (``"RRLR"``), or a sequence for each.
         targets : array_like, shape (N, G, dof)
-            Targets, in length units (base) and rad (joints). A joint whose target is NaN does not
-            move. If all targets of a goal are NaN, there is no movement to a target: only the
-            corrective process acts, and the method has to declare it. A trial with a target beyond
+            Targets, in length units (base) and rad (joints). A coordinate whose entry is NaN does
+            not move. If all entries of a goal are NaN, there is no movement to a target: only the
+            corrective process acts, and the method has to declare it. A trial with an entry beyond
             ±100,000 fails without a movement (:meth:`trial` raises an error instead).
         until : array_like, shape (N,), optional
-            Threshold of the reward for each trial. The first trial whose reward exceeds the
-            threshold for this trial is the last trial that is counted and returned.
+            A threshold for the reward of each trial. The first trial whose reward exceeds its
+            threshold is the last trial that is counted and returned.
         draws : array_like of int, shape (N,), optional
             Number of the noise draw for each trial, from 0 to 2^53. Trials with the same draw are
-            made with the same noise (*common random numbers*). By default trial k of the session is
-            made with draw k. Without motor noise the draws have no effect.
+            made with the same noise (*common random numbers*). By default trial k of the session
+            (from 0) is made with draw k. Without motor noise the draws have no effect.
 
         Returns
         -------
         Trials
-            The results, with a row for each trial made. If only n < N trials are left in the
-            budget, only the first n trials are made. If ``Information.CORRECTIVE_PROCESS`` is not
-            declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` are empty.
+            The results, with a row for each trial that is counted. If only n < N trials are left in
+            the budget, only the first n trials are made. If ``Information.CORRECTIVE_PROCESS`` is
+            not declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` are empty.
 
         Raises
         ------
@@ -557,7 +563,8 @@ class Session:
         BudgetError
             N is above 0, and the budget has no trial left.
         ValueError
-            Hands or arrays do not fit.
+            Hands or arrays do not fit the task or N, or a target moves a locked base coordinate by
+            more than 1e-6.
         """
         self._use(Information.REWARD_BY_TRIAL)
         configurations = check_targets(self._task, targets)
@@ -598,7 +605,7 @@ class Session:
             )
         return min(count, left)
 
-    # The same calls for an objective, which checks points and budget itself.
+    # Parts of these calls. An objective uses them as well, and checks points and budget itself.
 
     @cached_property
     def _compiled(self) -> CompiledTask:
@@ -614,7 +621,10 @@ class Session:
         return hand_codes(self._task, hands, count)
 
     def _worlds(self, count: int, draws: ArrayLike | None = None) -> NDArray[np.uint64]:
-        """Return the worlds of the next ``count`` trials (:func:`noise_draws`)."""
+        """Return the noise seed and noise draw of the next ``count`` trials (:func:`noise_draws`).
+
+        Without motor noise the result is :data:`NO_NOISE`. By default trial k has draw k.
+        """
         if self.model.motor_noise == 0.0:
             return NO_NOISE
         numbers = self.trials_made + np.arange(count) if draws is None else draws
@@ -646,7 +656,7 @@ class Session:
         until: Array | None = None,
         draws: NDArray[np.int64] | None = None,
     ) -> TrialRecords:
-        """Make and count N trials, and return their per-goal records.
+        """Make and count N trials, and return their records.
 
         If ``until`` is passed, fewer than N trials may be counted and returned (:meth:`trials`).
         ``codes`` are the hands, 0 (left) or 1 (right), shape ``(N, G)``. The caller checks
@@ -667,15 +677,15 @@ class Session:
         """Find the hand sequence of the first trial, such as ``"RRRR"``.
 
         If the task names a sequence, that sequence is returned. If the task names a policy, the
-        session tries the corrective process on its own with each candidate sequence, without motor
-        noise, and returns the sequence with the highest reward. The candidates are
+        session makes a trial with only the corrective process, without motor noise, with each
+        candidate sequence, and returns the sequence with the highest reward. The candidates are
 
         - ``"best-single-hand"``: the sequences of one hand;
         - ``"best-of-all"``: all sequences.
 
-        The trials of this search are counted as ``initial_trials``: they are included neither in
-        the number of trials of the method nor in its budget. The ticks and other counts of these
-        trials are added to the counts of the method.
+        The trials of this search are counted as ``initial_trials``. They are not included in the
+        number of trials, and do not use up the budget. Their ticks and other counts are added to
+        the counts of the method.
 
         Parameters
         ----------
@@ -788,10 +798,10 @@ class Session:
     def reveal(self, *information: Information) -> Task:
         """Return the task itself to a method of this project.
 
-        The method has to count its evaluations by :meth:`spend`. ``information`` is what the method
-        uses of the task, at least one item; all items are added to :attr:`used`. Raises
-        UndeclaredError if the method is not of this project, if no item is passed, or if the method
-        does not declare an item.
+        The method has to count its evaluations by :meth:`spend`. ``information`` contains each kind
+        of information that the method uses; all of them are added to :attr:`used`. Raises
+        UndeclaredError if the method does not belong to this project, if no information is passed,
+        or if the method does not declare one of the kinds.
         """
         self._needs_trust("reveal")
         if not information:
@@ -804,9 +814,9 @@ class Session:
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
         """Record trials that a compiled method of this project made outside the session's calls.
 
-        ``rewards`` contains an entry for each trial, None for a failed trial. ``solve_s`` (in s) is
-        added to the counter ``solve_s``. No other counter changes. Raises UndeclaredError if the
-        method is not of this project.
+        ``rewards`` contains an entry for each trial, None for a failed trial. The entries are added
+        to :attr:`rewards`, and ``solve_s`` (in s) is added to the counter ``solve_s``. No other
+        counter changes. Raises UndeclaredError if the method does not belong to this project.
         """
         self._needs_trust("record")
         self._rewards.extend(_pack_rewards(rewards))

@@ -1,8 +1,9 @@
-"""Python functions for single movements and corrections, which call the compiled kernels.
+"""Functions for single movements and corrections, and checks of their arguments.
 
-A movement is straight in joint space, or follows a path through waypoints. Its length is measured
-in the norm of the motion model, in which a length unit of the base is as long as ``base_weight``
-rad of a joint.
+:func:`move`, :func:`follow` and :func:`correct` call the compiled kernels. A movement is straight
+in joint space, or follows a path through waypoints. The length of a movement is measured in the
+norm of the motion model, in which a length unit of the base is as long as ``base_weight`` rad of a
+joint.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from coartic.robot import BASE_DOF, HANDS, MAX_ENTRY, Array, Hand, Robot
 
 
 class MoveResult(NamedTuple):
-    """Result of one movement (:func:`move`)."""
+    """Result of one movement (:func:`move`, :func:`coartic.motion.doors.follow`)."""
 
     q: Array
     """Configuration in which the movement stopped, shape ``(dof,)``, in length units and rad."""
@@ -32,7 +33,8 @@ class MoveResult(NamedTuple):
     hit: bool
     """True if the hand is within the goal's radius."""
     evaluations: int
-    """Forward-kinematics evaluations; on a path (:func:`follow`) one per tick."""
+    """Number of forward-kinematics evaluations. On a path there is one per tick. On a straight
+    movement there can be fewer, because steps that cannot end the movement are skipped."""
 
 
 class Correction(NamedTuple):
@@ -60,6 +62,9 @@ def move(
 ) -> MoveResult:
     """Move the robot straight in joint space, until a hand hits its goal or arrives.
 
+    The movement ends at the target configuration at the latest. A movement of k steps takes k + 1
+    ticks.
+
     Parameters
     ----------
     robot : Robot
@@ -76,8 +81,8 @@ def move(
         Radius of the goal (in length units).
     stop_on_arrival : bool
         If True, the movement also ends when the hand is within ``arrival_tolerance`` of the
-        position that the hand has at the target. If False, as in a corrective movement, the
-        movement ends only on a hit or at its target.
+        position that the hand has in the target configuration. If False, as in a corrective
+        movement, the movement ends only on a hit or at its target configuration.
     model : MotionModel
         The motion model. Its constants ``gain``, ``correction_tolerance`` and ``max_iterations``
         are not used.
@@ -93,7 +98,7 @@ def move(
         An argument cannot be used:
 
         - a shape is wrong;
-        - a number is not finite, or beyond 100,000;
+        - a number is not finite, or is beyond ±100,000;
         - the radius is below 0;
         - the hand is unknown;
         - a constant of the model is out of bounds, or the model has motor noise.
@@ -158,10 +163,15 @@ def follow(
     Raises
     ------
     ValueError
-        A shape is wrong, the hand is unknown, a number is not finite or out of bounds, or the model
-        has motor noise.
+        An argument cannot be used:
+
+        - a shape is wrong, or there is no waypoint;
+        - a number is not finite, or is beyond ±100,000;
+        - the radius is below 0;
+        - the hand is unknown;
+        - a constant of the model is out of bounds, or the model has motor noise.
     TypeError
-        ``robot`` or ``model`` has a wrong type.
+        ``robot``, ``waypoints`` or ``model`` has a wrong type.
     """
     batch = one_run(robot, q, hand, goal, radius)
     points = finite_array("waypoints", waypoints, (max(len(waypoints), 1), robot.dof))
@@ -173,11 +183,12 @@ def follow(
 
 
 def scale_base(changes: Array, model: MotionModel) -> Array:
-    """Multiply the base coordinates of changes of a configuration by the weight of the base.
+    """Multiply the base coordinates of joint-space vectors by the weight of the base.
 
-    ``changes`` and the result have shape ``(..., dof)``. The length of the straight movement that
-    makes the change in a row of ``changes`` is the norm of the same row of the result. The norm is
-    that of ``model``. If the weight is 1, ``changes`` itself is returned.
+    ``changes`` contains differences between configurations. The array and the result have shape
+    ``(..., dof)``. The norm of a row of the result, in the norm of ``model``, is the length of the
+    straight movement by the same row of ``changes``. If the weight is 1, ``changes`` itself is
+    returned.
     """
     if model.base_weight == 1.0:
         return changes
@@ -187,22 +198,25 @@ def scale_base(changes: Array, model: MotionModel) -> Array:
 
 
 def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
-    """Return the configurations of a straight movement, one after each control step.
+    """Return the configurations of a straight movement, spaced by ``model.step``.
+
+    The last step may be shorter.
 
     Parameters
     ----------
     q : ndarray, shape (dof,)
         Configuration at the beginning, in length units (base) and rad (joints).
     target : ndarray, shape (dof,)
-        Configuration at the end. An entry that is NaN does not move.
+        Configuration at the end. A coordinate whose entry is NaN does not move.
     model : MotionModel
-        Motion model with the length of a step, the norm and the weight of the base.
+        Motion model with the length of a step, the norm and the weight of the base. Its motor noise
+        is ignored.
 
     Returns
     -------
     ndarray, shape (n + 1, dof)
-        Configurations of a movement of n steps, including both ends. The kernels compute the same
-        configurations, bit for bit.
+        Configurations of a movement of n steps, including both ends. Without motor noise the
+        kernels compute the same configurations, bit for bit.
 
     Examples
     --------
@@ -223,7 +237,7 @@ def segment_lengths(configurations: ArrayLike, model: MotionModel = PAPER) -> Ar
 
     The distance is measured in the norm of ``model``, with its weight of the base.
     ``configurations`` has shape ``(k, dof)``, in length units and rad. The result has shape
-    ``(k - 1,)``, in a mix of both units.
+    ``(k - 1,)``; a distance combines both units.
 
     Examples
     --------
@@ -328,8 +342,8 @@ def one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Ba
 def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
     """Convert the centre of a goal to two floats, x and y (in length units).
 
-    Raises ValueError if ``centre`` does not consist of two finite numbers within ±100,000, or if
-    ``radius`` is not from 0 to 100,000 (in length units).
+    Raises ValueError if ``centre`` does not consist of two finite numbers within ±100,000. The
+    function also raises ValueError if ``radius`` (in length units) is not from 0 to 100,000.
     """
     x, y = finite_array("goal", centre, (2,)).tolist()
     check_limits("radius", radius, 0.0, MAX_ENTRY)
@@ -347,8 +361,8 @@ def correct(
 ) -> Correction:
     """Find a configuration that puts a hand at a goal, by Jacobian-transpose inverse kinematics.
 
-    This is the paper's corrective process: gradient descent, from ``q``, on the distance of the
-    hand from the goal. The other arm does not move.
+    This is the paper's corrective process: gradient descent, from ``q``, on half the squared
+    distance of the hand from the goal. The joints of the other arm do not change.
 
     Parameters
     ----------
@@ -357,7 +371,7 @@ def correct(
     q : ndarray, shape (dof,)
         Configuration in which the process begins, in length units (base) and rad (joints).
     hand : {"left", "right"}
-        The hand.
+        The hand that is to reach the goal.
     goal : tuple of float
         Centre of the goal, x and y in length units.
     locked_base : collection of {"x", "y"}
@@ -369,9 +383,9 @@ def correct(
     Returns
     -------
     Correction
-        The configuration, whether the hand is at the goal in this configuration, and how many
-        iterations the process took. If the process does not converge within
-        ``model.max_iterations``, ``converged`` is False, and no error is raised.
+        The configuration, whether the process converged, and the number of iterations. No error is
+        raised if the process gets stuck, or would need more than ``model.max_iterations``
+        iterations: ``converged`` is then False.
 
     Raises
     ------
@@ -381,7 +395,7 @@ def correct(
         An argument cannot be used:
 
         - a shape is wrong;
-        - a number is not finite, or beyond 100,000;
+        - a number is not finite, or is beyond ±100,000;
         - the hand is unknown;
         - ``locked_base`` has an entry other than ``"x"`` and ``"y"``;
         - a constant of the model is out of bounds, or the model has motor noise.

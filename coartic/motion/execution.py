@@ -5,8 +5,8 @@ the control ticks of all movements are counted. If the movements miss a goal, th
 moves the hand into the goal. The score of a solution is the reward of this execution; a reward that
 a method itself reports is ignored.
 
-:func:`execute` executes a solution without noise, :func:`execute_noisy` many times with motor
-noise.
+:func:`execute` executes a solution once without noise. :func:`execute_noisy` executes solutions
+many times with motor noise.
 """
 
 from __future__ import annotations
@@ -63,9 +63,14 @@ class Execution:
     """Result of executing a solution: movements made, ticks and reward (:func:`execute`)."""
 
     movements: tuple[Movement, ...]
-    """The movements that were made, in order, with targets and ticks. With motor noise, targets are
-    those without the noise. Several corrections for a goal, which occur only with motor noise, are
-    combined into one movement with the target of the last correction and the sum of all ticks."""
+    """The movements that were made, in order, with targets and ticks.
+
+    - A goal that is hit without a movement has a corrective movement of 0 ticks.
+    - With motor noise, targets are those without the noise.
+    - Several corrections for a goal, which occur only with motor noise, are combined into one
+      movement. Its target is the last configuration of the last corrective process, and its ticks
+      are the sum of all ticks.
+    """
     configurations: Array
     """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, in length units
     and rad."""
@@ -76,9 +81,13 @@ class Execution:
     iterations: int = 0
     """Iterations of the corrective process, with one Jacobian each."""
     evaluations: int = 0
-    """Forward-kinematics evaluations. A correction of k iterations makes k + 1 evaluations. Each
-    goal that is tried adds one evaluation if its first movement is corrective, and two
-    otherwise."""
+    """Forward-kinematics evaluations, which are the sum of
+
+    - the evaluations of all movements, without steps that cannot end a straight movement;
+    - k + 1 evaluations for a correction of k iterations;
+    - for each goal that is tried, one evaluation if its first movement is corrective, and two
+      otherwise.
+    """
     reason: str = ""
     """Sentence on why the task was not completed; empty if it was completed."""
     __eq__ = equal_contents
@@ -95,7 +104,7 @@ class Execution:
 
     @property
     def hands(self) -> str:
-        """Hand of each goal that has a movement, in goal order, such as ``"LRLR"``."""
+        """Hand sequence of the goals that have movements, such as ``"LRLR"``."""
         return hands_in(self.movements)
 
     def ticks_by_goal(self) -> tuple[int, ...]:
@@ -116,8 +125,8 @@ def execute(
     """Execute a solution from the task's start, and score it.
 
     If the movements for a goal miss the goal, the corrective process starts from the robot's
-    present configuration and makes a corrective movement. The ticks of this movement are counted,
-    too.
+    present configuration and makes a corrective movement. The ticks of this movement are counted as
+    well.
 
     Parameters
     ----------
@@ -138,15 +147,15 @@ def execute(
     TaskError, TypeError
         The task cannot be used, or ``task`` or ``model`` has a wrong type.
     SolutionError
-        The solution breaks a rule of the task:
+        The solution breaks a rule of the task, for example:
 
         - goals are missing or out of order;
         - the hand of a movement is not a hand of the task;
-        - a target has the wrong shape or is not finite;
-        - a locked base moves by more than 1e-6.
+        - a target has the wrong shape, an infinite entry, or NaN in all entries;
+        - a target moves a locked base coordinate by more than 1e-6.
     ValueError
-        A constant of the model is out of bounds, or the model has motor noise
-        (:func:`execute_noisy`).
+        A constant of the model is out of bounds or does not fit the radius of the goals, or the
+        model has motor noise (use :func:`execute_noisy`).
 
     Notes
     -----
@@ -165,7 +174,7 @@ def execute_many(
     solutions: Iterable[Iterable[Movement]],
     worlds: NDArray[np.uint64] = NO_NOISE,
 ) -> list[Execution | Refused]:
-    """Execute many solutions of one task side by side.
+    """Execute many solutions of one task at once.
 
     Parameters
     ----------
@@ -211,10 +220,9 @@ class Requested(NamedTuple):
 def _with_targets(movements: list[Movement], corrective: float = math.inf) -> list[Movement | None]:
     """Return the movements for a goal that are made before the corrective process acts.
 
-    These are the movements with targets, up to the first movement without a target or, if that
-    comes earlier, up to the corrective movement that follows ``corrective`` other movements. If the
-    first movement is corrective, the list begins with None, which stands for a check whether the
-    hand is in the goal already.
+    The list ends before the first movement without a target. It contains at most ``corrective``
+    corrective movements, and ends before the next one. If the first of ``movements`` is corrective,
+    the list begins with None, which stands for a check whether the hand is in the goal already.
     """
     aimed: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:
@@ -236,7 +244,7 @@ def _requested(
     aims : sequence of list of list
         For each solution and goal, the movements of :func:`_with_targets`.
     hands : list of int
-        Hand of each goal of each solution, 0 left or 1 right.
+        Hands of all goals of all solutions, 0 left or 1 right.
     """
     goals = [movements for of_solution in aims for movements in of_solution]
     length = max(map(len, goals))
@@ -259,7 +267,7 @@ def _execute_plans(
     plans: Sequence[Plan],
     worlds: NDArray[np.uint64],
 ) -> list[Execution]:
-    """Execute plans side by side, and return the executions in their order."""
+    """Execute plans at once, and return the executions in the order of the plans."""
     if not plans:
         return []
     aims = [[_with_targets(movements) for movements in plan] for plan in plans]
@@ -273,9 +281,10 @@ def _execute_plans(
 def movements_in(
     records: NDArray[np.void], dof: int, requested: Iterable[Iterable[Sequence[Movement | None]]]
 ) -> list[list[Movement]]:
-    """Return the movements made in N trials, up to the first goal that was missed.
+    """Return the movements that were made in each of N trials.
 
-    A goal that was hit without a movement gets a corrective movement of 0 ticks.
+    The movements for the first goal that was missed are included. A goal that was hit without a
+    movement gets a corrective movement of 0 ticks.
 
     Parameters
     ----------
@@ -285,7 +294,7 @@ def movements_in(
         Number of entries of a configuration.
     requested : iterable of iterable of sequence of Movement or None
         For each trial and goal, the movements that were requested (:func:`_with_targets`). The
-        kinds of the returned movements are copied from the requested movements.
+        kinds of these movements are copied. The movement of a correction has kind ``corrective``.
 
     Returns
     -------
@@ -330,7 +339,7 @@ def _execution_of(
     plan : list of list of Movement
         Requested movements for each goal.
     movements : list of Movement
-        Movements that were made, up to the first goal that was missed.
+        Movements that were made (:func:`movements_in`).
     goals : ndarray, shape (G,)
         Per-goal records of the trial.
     """
@@ -352,9 +361,9 @@ def _execution_of(
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
     """Compute the joint travel of the idle arm, summed over the goals (in rad).
 
-    The idle arm of a goal is the arm that does not hit the goal. Its travel on the way to the goal
-    is the Euclidean distance between its joint angles at the hit of this goal and at the hit of the
-    goal before (for goal 1, at the start).
+    The idle arm of a goal is the arm whose hand does not hit the goal. Its travel on the way to the
+    goal is a Euclidean distance between joint angles: from its angles at the hit of the previous
+    goal (for goal 1, at the start) to its angles at the hit of this goal.
 
     Parameters
     ----------
@@ -398,7 +407,8 @@ def sample_execution(
     -------
     ndarray, shape (ticks, dof)
         Configurations, in length units and rad. The first row is the start. A movement of k steps
-        has k + 1 rows, so that its last row is repeated as the first row of the next movement.
+        has k + 1 rows. The last row of a movement is therefore repeated as the first row of the
+        next movement.
     """
     q, rows = np.array(task.q0), [np.empty((0, task.robot.dof))]
     for movement in movements:
@@ -441,11 +451,12 @@ def execute_noisy(
         Standard deviation s of the noise, from 0 to 100, in length units (base) and rad (joints).
         If it is 0, the ticks are the same as in :func:`coartic.execute`.
     repeats : int
-        Number R of executions of each solution.
+        Number R of executions of each solution, from 1 to 1,000,000.
     seed : int or iterable of int
         Seed of the noise, from 0 to 2^128 - 1: one seed for all solutions, or one for each. With
         one seed, execution number r is made with the same noise for all solutions (*common random
-        numbers*). The ticks of a solution depend neither on the other solutions nor on ``repeats``.
+        numbers*). The ticks of execution number r of a solution depend neither on the other
+        solutions nor on ``repeats``.
     model : MotionModel
         The motion model of the executions. Its constant ``motor_noise`` must be 0.
     signal_dependent : bool
@@ -457,17 +468,20 @@ def execute_noisy(
     ndarray, shape (K, R)
         Control ticks of each execution; NaN if the execution failed. An execution fails if the
         corrective process does not converge, or if a goal is still missed after 50 corrections. If
-        executions of a solution fail, report the number of failures as well, because the mean over
-        all other executions is too low.
+        executions of a solution fail, report the number of failures as well: the mean over the
+        other executions alone would make the solution look better than it is.
 
     Raises
     ------
     TaskError, TypeError
         The task cannot be used, or an argument has a wrong type.
     SolutionError
-        A solution breaks the task's rules, as in :func:`coartic.execute`. Or the sum of the ticks
-        stored in its movements differs from the ticks that it takes on this task with this model,
-        for example because the solution belongs to another task.
+        One of these is the case:
+
+        - a solution breaks the task's rules, as in :func:`coartic.execute`;
+        - all movements of a solution have stored ticks, and the sum of these ticks differs from the
+          ticks of the execution without noise, for example because the solution belongs to another
+          task.
     ValueError
         ``motor_noise``, ``repeats``, ``seed`` or a constant of the model is out of bounds, the
         model has motor noise, or the number of seeds is not the number of solutions.
@@ -485,15 +499,16 @@ def execute_noisy(
     - A coordinate *moves* if its entry of the target, or of any waypoint, is a number that differs
       by more than 1e-9 from where the robot stands now. A locked base does not move.
     - The target of a *correction* is the configuration a that the corrective process finds from q.
-      If the solution has a corrective movement with a target, that target is not used. L is the
-      Euclidean distance from q to a. A locked base coordinate keeps a_c.
+      L is the Euclidean distance from q to a. A locked base coordinate ends at a_c.
     - With ``signal_dependent`` all three rows have s min(1, L) instead of s. L is then the
       Euclidean distance from q to the target without noise (for a path, to its last waypoint).
     - The noisy target takes the place of the target everywhere: for the hit, for the arrival of an
       aimed movement, and for the tick that the arrival costs.
-    - A corrective movement of the solution is compared with the corrective process in the execution
-      without noise. If the targets of the two differ by more than 1e-9, the movement is treated as
-      an aimed movement, which ends on a hit or at its target.
+    - If the solution contains a corrective movement with a target, this target is compared with the
+      configuration that the corrective process finds in the execution without noise. If they differ
+      by more than 1e-9 in a coordinate, or if the process does not converge, the movement is
+      treated as an aimed movement, which ends on a hit or at its target. Otherwise it is treated as
+      a correction, and its stored target is not used.
     - z is a function of the seed, the number of the execution, the goal, the number of the movement
       made for this goal and the coordinate (:mod:`coartic.motion.kernels.noise`).
 
@@ -548,7 +563,7 @@ def execute_noisy(
 
 
 def _hands_of(plans: Sequence[Plan]) -> list[int]:
-    """Return the hand of each goal of each plan, 0 left or 1 right."""
+    """Return a list of the hands of all goals of all plans, 0 left or 1 right."""
     return [HANDS.index(movements[0].hand) for plan in plans for movements in plan]
 
 
@@ -562,10 +577,10 @@ def _execute_exactly(
 ) -> tuple[list[list[list[Movement | None]]], Array]:
     """Execute plans without noise, and find out which movements are aimed movements.
 
-    A corrective movement with a target is treated as a movement of the corrective process if the
-    process, starting from the configuration in which the robot then stands, finds this target to
-    within 1e-9. Otherwise, and if the process does not converge, the movement is treated as an
-    aimed movement.
+    A corrective movement with a target is treated as a correction if the corrective process,
+    starting from the configuration in which the robot then stands, finds this target to within
+    1e-9. Otherwise, and if the process does not converge, the movement is treated as an aimed
+    movement.
 
     Returns
     -------
@@ -602,8 +617,8 @@ def _is_found(goal: np.void, target: Array) -> bool:
     """Return whether the corrective process itself finds the target of a corrective movement.
 
     ``goal`` is the record of the goal in an execution in which the process acts in place of the
-    corrective movement to ``target``. The result is also True if no movement is made, because the
-    goal is hit already.
+    corrective movement to ``target``. Entries of ``target`` that are NaN are not compared. The
+    result is also True if the goal is hit before a correction is made.
     """
     if goal["corrections"] == 0:
         return bool(goal["hit"])
@@ -680,7 +695,8 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     TaskError, TypeError
         The task cannot be used, or ``task`` or ``model`` has a wrong type.
     ValueError
-        The hands do not fit the task, or a constant of the model is out of bounds.
+        The hands do not fit the task, a constant of the model is out of bounds, or the model has
+        motor noise.
 
     Notes
     -----
@@ -703,8 +719,8 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
     Returns
     -------
     list of str
-        The sequences in alphabetical order, such as ``"LLLR"``: one letter for each of G goals, 2^G
-        sequences for two hands.
+        The sequences, such as ``"LLLR"``, in alphabetical order. A sequence has one letter for each
+        of G goals. With two hands there are 2^G sequences.
 
     Raises
     ------
@@ -724,8 +740,8 @@ def initial_hands(
 ) -> str:
     """Find the hand sequence of a task's first trial.
 
-    If the task names a sequence, that sequence is returned. If the task names a policy, the
-    corrective process on its own is tried with each candidate sequence, and the sequence with the
+    If the task names a sequence, that sequence is returned. If the task names a policy, one trial
+    with only the corrective process is made with each candidate sequence, and the sequence with the
     highest reward is returned. The candidates are
 
     - ``"best-single-hand"``: the sequences of one hand;
@@ -768,7 +784,7 @@ def initial_hands(
 
 
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
-    """Return the reward of the corrective process on its own with a task's initial hands.
+    """Return the reward of the trial with only the corrective process and the initial hands.
 
     The motor noise of ``model`` is ignored. The result is None if the trial fails, or if the task
     names a policy that finds no hands (:func:`initial_hands`).

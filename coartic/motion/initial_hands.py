@@ -42,10 +42,15 @@ def ranked_sequences(
     Returns
     -------
     list of tuple
-        Tuple ``(sequence, reward, reason, counts)`` for each sequence. ``reward`` is None if the
-        trial failed; ``reason`` says why, and is empty otherwise. ``counts`` is a dict that maps
-        the names in :data:`COUNTED` to the counts of the trial; as in :func:`coartic.execute`, each
-        goal that is tried adds an evaluation of the forward kinematics. The tuples are sorted
+        A tuple ``(sequence, reward, reason, counts)`` for each sequence:
+
+        - ``reward`` is the reward of the trial, or None if the trial failed;
+        - ``reason`` says why the trial failed, and is empty if it did not;
+        - ``counts`` is a dict that maps the names in :data:`COUNTED` to the counts of the trial. As
+          in :func:`coartic.execute`, each goal that is tried adds one evaluation of the forward
+          kinematics.
+
+        The tuples are sorted
 
         - by reward, the highest first and failed trials last;
         - then by the number of changes of hand, the fewest first;
@@ -90,10 +95,14 @@ def _best_of_all(task_json: str, model: MotionModel) -> tuple[str, int] | None:
 def best_hands(task: Task, model: MotionModel = PAPER) -> tuple[str, int] | None:
     """Return the best hand sequence of the corrective process on its own, and its ticks.
 
-    The best sequence is the one with the fewest ticks; motor noise of ``model`` is ignored. For a
-    task with more than 4096 hand sequences, only its initial sequence is tried. The result is None
-    if the process completes the task with no sequence, or if a task with more than 4096 sequences
-    names a policy instead of an initial sequence. Results are cached; the trials are not counted.
+    The best sequence is the one with the fewest ticks; the motor noise of ``model`` is ignored. For
+    a task with more than 4096 hand sequences, only its initial sequence is tried. The result is
+    None
+
+    - if the process completes the task with none of the sequences that are tried;
+    - if a task with more than 4096 sequences names a policy instead of an initial sequence.
+
+    Results are cached; the trials are not counted.
     """
     return _best_of_all(task.model_dump_json(), model.without_noise())
 
@@ -106,8 +115,9 @@ def changes_of_hand(sequence: str) -> int:
 def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
     """List all hand sequences for a number of goals, in alphabetical order.
 
-    The sequences are strings such as ``"LRLR"`` of the letters of ``hands``. Raises
-    NotApplicableError, with the name ``task`` in the message, if there are more than 4096.
+    The sequences, such as ``"LRLR"``, consist of the letters of ``hands``. Raises
+    NotApplicableError, with the name ``task`` in the message, if there are more than 4096
+    sequences.
 
     Examples
     --------
@@ -133,9 +143,10 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
-    """Check hands and return them as a tuple; None stands for all hands.
+    """Check hands, and return them as a tuple.
 
-    Raises ValueError if ``hands`` is empty or names a hand that the task does not have.
+    None stands for all hands of the task. Raises ValueError if ``hands`` is empty or names a hand
+    that the task does not have.
     """
     if hands is None:
         return task.hands
@@ -157,8 +168,10 @@ def search_initial_hands(
     """Find the hand sequence of trial 0, and count the trials of the search.
 
     If the task names a sequence, that sequence is returned with no counts. If the task names a
-    policy, the first sequence of :func:`ranked_sequences` is returned. The candidates are the
-    sequences of one hand with ``"best-single-hand"``, and all sequences otherwise.
+    policy, the first sequence of :func:`ranked_sequences` is returned. The ranked sequences are
+
+    - ``"best-single-hand"``: the sequences of one hand;
+    - ``"best-of-all"``: all sequences.
 
     The trials of the search are counted by :func:`count_trials`, even if the result comes from the
     cache. If the search fails, its trials are not counted.
@@ -177,7 +190,7 @@ def search_initial_hands(
         The hand sequence, such as ``"RRRR"``.
     counts : mapping of str to int
         Dict that maps names of counters of :class:`~coartic.method.Meter` to the counts of the
-        search. It is cached: do not change it.
+        search; empty if there was no search. The dict is cached: do not change it.
 
     Raises
     ------
@@ -202,8 +215,8 @@ def _search_by_policy(
 ) -> tuple[str, Mapping[str, int]]:
     """Search for the hands of trial 0 by the task's policy (:func:`search_initial_hands`).
 
-    The last 64 results are cached (LRU). So that the arguments are hashable, the task is passed as
-    JSON, and ``hands`` as a tuple. The caller counts the trials.
+    The last 64 results are cached (LRU). The task is passed as JSON and ``hands`` as a tuple,
+    because arguments of a cached function must be hashable. The caller counts the trials.
     """
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)

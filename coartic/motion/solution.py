@@ -1,6 +1,6 @@
-"""Solutions of tasks. A solution is a list of movements, at least one for each goal of a task.
+"""Solutions of tasks: lists of movements, with at least one movement for each goal.
 
-:func:`coartic.motion.execution.execute` executes and scores them.
+:func:`coartic.execute` executes and scores a solution.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from coartic.tasks.task import Task, hands_of, letters_of
 Kind = Literal["learned", "corrective", "planned", "path"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 HELD = 1e-6
-"""Largest distance of a locked base coordinate of a target from its value at the start (in length
-units). Solvers leave smaller differences."""
+"""Largest allowed difference between a locked base coordinate of a target and its value at the
+start (in length units). Results of solvers differ by less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +52,9 @@ class Movement:
     made only while the goal is not hit.
     """
     target: Array | None = None
-    """Target configuration q^t, shape ``(dof,)``, in length units and rad; for a path its last
-    waypoint. A joint whose entry is NaN does not move (a path must not have NaN). If a corrective
-    movement has None, the corrective process finds the target during execution."""
+    """Target configuration q^t, shape ``(dof,)``, in length units and rad. A coordinate whose entry
+    is NaN does not move. The target of a path is its last waypoint, without NaN, or None. If a
+    corrective movement has None, the corrective process finds the target during execution."""
     ticks: int | None = None
     """Control ticks of the movement; None before the movement is executed."""
     waypoints: Array | None = None
@@ -71,7 +71,7 @@ class Movement:
 
 
 def hands_in(movements: Iterable[Movement]) -> str:
-    """Return the hand of each goal that has a movement, such as ``"LRLR"``."""
+    """Return the hand sequence of the goals that have movements, such as ``"LRLR"``."""
     by_goal = {movement.goal: movement.hand for movement in movements}
     return letters_of([by_goal[goal] for goal in sorted(by_goal)])
 
@@ -85,10 +85,10 @@ def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
 
 
 def next_action(movements: Iterable[Movement]) -> tuple[Movement, ...]:
-    """Return copies of movements without what depends on the noise of one execution.
+    """Return copies of movements without the results of one noisy execution.
 
-    The ticks, and the targets of corrective movements, depend on the noise. In the copies both are
-    None, so that the movements can be executed again with other noise.
+    In the copies all ticks, and the targets of corrective movements, are None, because they depend
+    on the noise of that execution. The copies can be executed again with other noise.
     """
     return tuple(
         replace(movement, ticks=None, target=None)
@@ -106,8 +106,9 @@ of a suite is something else.)"""
 def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     """Check a solution, and return a list of its movements for each goal.
 
-    In the result, the target of a movement of kind ``path`` is its last waypoint. Where the base is
-    locked, the base coordinates of each target are those of the task's start configuration.
+    In the result, the target of a movement of kind ``path`` is its last waypoint. Locked base
+    coordinates of targets and waypoints are set to those of the task's start configuration; NaN is
+    kept.
 
     Parameters
     ----------
@@ -165,8 +166,8 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
 def _check_movement(task: Task, movement: Movement) -> Movement:
     """Check the hand, the kind, the target and the waypoints of a movement.
 
-    Return the movement itself, or a copy whose arrays are changed as :func:`movements_by_goal`
-    says. Raises SolutionError or ValueError if something does not fit.
+    Return the movement itself, or a copy with changed arrays (:func:`movements_by_goal`). Raises
+    SolutionError or ValueError if something does not fit the task.
     """
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
     if not isinstance(movement.hand, str) or movement.hand not in task.hands:
@@ -203,10 +204,14 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
 def _check_point(task: Task, point: Any, kind: Kind = "path") -> Array:
     """Check a target or a waypoint, and return it as an array, shape ``(dof,)``.
 
-    The result is the array that was passed, or a new array if locked base coordinates have to be
-    set to those of the task's start configuration. Entries of a target may be NaN. Raises
-    ValueError if ``point`` is not a configuration of the robot, if all entries are NaN, or if it
-    moves a locked base coordinate by more than 1e-6.
+    In the result, locked base coordinates are those of the task's start configuration. The result
+    is usually the array that was passed, and a new array if something has to be changed. Raises
+    ValueError
+
+    - if ``point`` is not a configuration of the robot; entries of a target may be NaN, but not
+      those of a waypoint;
+    - if all entries are NaN;
+    - if ``point`` moves a locked base coordinate by more than 1e-6.
     """
     usual = type(point) is np.ndarray and point.dtype == np.float64
     # The length is quick to compute; with a NaN entry it is not below any limit.
@@ -275,19 +280,22 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
     hands : str
         The hand for each goal, such as ``"RRLR"``.
     targets : array_like, shape (G, dof)
-        The configuration to move to for each goal, in length units (base) and rad (joints). A joint
-        whose entry is NaN does not move. For a row of NaN only the corrective process acts.
+        Target configuration for each goal, in length units (base) and rad (joints). A coordinate
+        whose entry is NaN does not move. At a goal whose entries are all NaN, only the corrective
+        process acts.
 
     Returns
     -------
     tuple of Movement
-        A movement for each goal, of kind ``learned``, or ``corrective`` for a row of NaN.
-        :func:`coartic.execute` and :func:`coartic.trajectory` accept the tuple as a solution.
+        A movement for each goal. Its kind is ``corrective`` if all entries of the goal are NaN, and
+        ``learned`` otherwise. :func:`coartic.execute` and :func:`coartic.trajectory` accept the
+        tuple as a solution.
 
     Raises
     ------
     ValueError
-        The hands are not letters L and R, or the number of rows is not the number of hands.
+        The hands are not letters L and R, ``targets`` is not an array of real numbers with two
+        axes, or the number of its rows is not the number of hands.
 
     Examples
     --------
@@ -311,6 +319,7 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
 def corrective_movements(hands: str) -> list[Movement]:
     """Return, for each goal, a corrective movement that has no target.
 
-    ``hands`` is a hand sequence such as ``"RRLR"``.
+    ``hands`` is a hand sequence such as ``"RRLR"``. Raises ValueError for other letters than L and
+    R.
     """
     return [Movement(number, hand, "corrective") for number, hand in enumerate(hands_of(hands), 1)]

@@ -1,7 +1,7 @@
-"""Make trials with given targets by the compiled kernels, and count them.
+"""Make trials with given targets by the compiled kernels, and count the trials.
 
-Sessions, objectives, executions and environments make their trials through this module. The kernels
-make many trials side by side.
+Sessions, objectives, executions and environments make their trials through this module. A kernel
+makes many trials at once.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class TrialRecords(NamedTuple):
 
 
 SHARE = 14 * SLOTS
-"""Smallest number of trials for which a thread is started. Starting a thread takes as long as about
-a hundred trials."""
+"""Smallest number of trials of a thread, if trials are divided among threads. Starting a thread
+takes as long as about a hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 """Pool of batches that no thread uses: a dict that maps :attr:`Robot.max_links` to a list of
 batches."""
@@ -87,26 +87,27 @@ NO_NOISE = np.zeros((1, 2), dtype=np.uint64)
 """Value of :attr:`Requests.worlds` for trials without noise."""
 PRACTICE, JUDGE = 0x70726163, 0x6A756467
 """Keys by which two different noise seeds are derived from the seed of a run: ``PRACTICE`` for the
-trials of the method, ``JUDGE`` for scoring its solution. So no solution is scored on noise that the
-method has met in its trials."""
+trials of the method, and ``JUDGE`` for the executions that score its solution. So no solution is
+scored on noise that occurred in the trials of the method."""
 
 
 @lru_cache(maxsize=4096)
 def noise_seed(seed: int, world: int = PRACTICE) -> int:
     """Derive the seed of the motor noise from the seed of a run.
 
-    The noise seed is from 0 to 2^64 - 1. It is a child of ``seed`` (``numpy.random.SeedSequence``),
-    so that the noise is independent of ``default_rng(seed)``. ``seed`` is from 0 to 2^128 - 1, and
-    the key ``world`` is :data:`PRACTICE` or :data:`JUDGE`.
+    The noise seed is an integer from 0 to 2^64 - 1. It comes from a child of ``seed``
+    (``numpy.random.SeedSequence``), so that the noise is independent of ``default_rng(seed)``.
+    ``seed`` is from 0 to 2^128 - 1, and the key ``world`` is :data:`PRACTICE` or :data:`JUDGE`.
     """
     return int(np.random.SeedSequence(seed, spawn_key=(world,)).generate_state(1, np.uint64)[0])
 
 
 def noise_draws(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
-    """Return the noise seed and the noise draw of N trials, shape ``(N, 2)``.
+    """Combine the noise seeds and the noise draws of N trials, shape ``(N, 2)``.
 
-    The result is a value for :attr:`Requests.worlds`. ``seeds`` (from :func:`noise_seed`) and
-    ``draws`` are integers or have shape ``(N,)``.
+    A row of the result contains the seed and the draw of a trial; the result is a value for
+    :attr:`Requests.worlds`. ``seeds`` (from :func:`noise_seed`) and ``draws`` are integers, or
+    arrays of shape ``(N,)``.
     """
     pairs = np.broadcast_arrays(np.asarray(seeds, np.uint64), np.asarray(draws, np.uint64))
     return np.stack(np.atleast_1d(*pairs), axis=1)
@@ -173,7 +174,7 @@ def reach_goals(
     locked_base: Sequence[str] = (),
     model: MotionModel = PAPER,
 ) -> Reached:
-    """Let each of N arms reach for one goal, side by side.
+    """Let each of N arms reach for its own goal, independently of the others.
 
     Parameters
     ----------
@@ -192,8 +193,8 @@ def reach_goals(
         does not move. An arm whose row is all NaN has no target: only the corrective process acts.
         By default no arm has a target.
     checks : bool
-        True if an arm without a target does not move when its hand is in its goal already; False if
-        the corrective process begins at once.
+        True if an arm without a target stays where it is when its hand is in its goal already;
+        False if the corrective process begins at once.
     locked_base : sequence of {"x", "y"}
         Coordinates of the base that the corrective process does not change.
     model : MotionModel
@@ -207,8 +208,15 @@ def reach_goals(
     Raises
     ------
     ValueError
-        A shape is wrong, a number outside ``targets`` is not finite or out of bounds, a hand is
-        neither 0 nor 1, or the model does not fit the radius or has motor noise.
+        An argument cannot be used:
+
+        - a type or a shape is wrong;
+        - a number outside ``targets`` is not finite, or is beyond ±100,000;
+        - the radius is below 1e-9;
+        - a hand is neither 0 nor 1;
+        - ``locked_base`` has an entry other than ``"x"`` and ``"y"``;
+        - a constant of the model is out of bounds or does not fit the radius, or the model has
+          motor noise.
 
     Notes
     -----
@@ -266,15 +274,15 @@ def compiled_task(
 ) -> CompiledTask:
     """Convert a task and a motion model to arrays for the kernels.
 
-    The arrays are cached: do not change them.
+    The last result is cached: do not change its arrays.
 
     Parameters
     ----------
     task : Task
     model : MotionModel
     checks : bool
-        True if an arm without a target does not move when its hand is in its goal already; False if
-        the corrective process begins at once.
+        True if an arm without a target stays where it is when its hand is in its goal already;
+        False if the corrective process begins at once.
     grows : bool
         True if the motor noise of aimed movements grows with their length.
 
@@ -316,23 +324,28 @@ def compiled_task(
     return compiled
 
 
-# ---- Trials outside the session of a run: honest methods make none ----
+# ---- Trials outside the session of a run ----
 
 _outside = 0
 
 
 def count_trials(count: int) -> None:
-    """Add to the number of trials made outside the sessions of runs.
+    """Add to the number of trials that this process made outside sessions of runs.
 
-    All trials are added when they are made. The session of a run then subtracts the trials of the
-    run, by a negative ``count``. :func:`trials_outside` returns the number.
+    Trials are added whenever they are made. The session of a run then subtracts the trials that it
+    made itself, by a negative ``count``. :func:`trials_outside` returns the number.
     """
     global _outside
     _outside += count
 
 
 def trials_outside() -> int:
-    """Return how many trials this process has made outside the sessions of runs."""
+    """Return how many trials this process has made outside the sessions of runs.
+
+    The number also includes trials that compiled methods of this project make in a run without
+    their session. The runner uses the number only for other methods, for which a trial outside the
+    session is an error.
+    """
     return _outside
 
 
@@ -374,8 +387,8 @@ def reach_next(
     q : ndarray, shape (1, dof)
         Present configuration of the robot, in length units and rad.
     hands, targets : ndarray
-        Hands and targets, as in :class:`Requests`. They determine for how many goals the robot
-        reaches.
+        Hands and targets, as in :class:`Requests`. The length of their second axis is the number of
+        goals for which the robot reaches.
     first : int
         Index in the task of the first of these goals, from 0.
     worlds : ndarray of int, shape (1, 2)
@@ -424,19 +437,17 @@ class Trials(NamedTuple):
     """Forward-kinematics evaluations, shape ``(N,)``; a correction takes one more than its
     iterations."""
     targets: Configs
-    """Targets of the movements made, shape ``(N, G, dof)``, in length units and rad. The entries of
-    a goal are NaN if no target was passed for it. For goals after a goal at which the trial failed,
-    they are the targets as they were passed."""
+    """Targets of the movements, shape ``(N, G, dof)``, in length units and rad. A coordinate whose
+    entry was passed as NaN has its value at the beginning of the movement. All entries of a goal
+    are NaN if no target was passed for it. The entries of goals after a goal at which the trial
+    failed are those that were passed."""
     reached: Configs
     """Configuration in which each goal was hit, shape ``(N, G, dof)``, in length units and rad; NaN
     for a goal that was not hit."""
 
     @property
     def rewards(self) -> Array:
-        """Total reward of each trial, minus its ticks, shape ``(N,)``.
-
-        The reward of a failed trial is -inf.
-        """
+        """Total reward of each trial, shape ``(N,)``: minus its ticks, or -inf if it failed."""
         return np.where(self.completed, -self.ticks, -np.inf)
 
 

@@ -1,4 +1,4 @@
-"""Tasks, the names under which they are found, and families of random tasks.
+"""Tasks, their names, families of random tasks, and best known rewards.
 
 This package imports the robot and its motion, but no method.
 """

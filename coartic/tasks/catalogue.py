@@ -46,7 +46,8 @@ def load_task(name_or_path: str | Path) -> Task:
     Raises
     ------
     TaskError
-        The task does not exist, or the file cannot be used: the message names the file.
+        The task does not exist, its family or file cannot be used, or the file is the file of a
+        family.
     TypeError
         The argument is neither a string nor a path.
     """

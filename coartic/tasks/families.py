@@ -1,21 +1,23 @@
 """Families of random tasks: distributions of tasks, and instances that never change.
 
-A family is defined by a file, ``families/NAME.vN.toml``. The file contains the distributions from
-which the number and the positions of the goals, the links of the arms, the base and the start are
-drawn. The file of a released family does not change; a changed family gets a new version.
+A family is defined by a file. The files of the shipped families are ``families/NAME.vN.toml``. A
+file contains the distributions from which the number and the positions of the goals, the links of
+the arms, the base and the start are drawn. The file of a released family does not change; a changed
+family gets a new version.
 
 An instance is a task with a name such as ``two-armed/v1/i017``. It depends only on the file of the
 family and on its name, because its numbers come from a counter-based random number generator
 (:mod:`coartic.tasks.philox`). The key of the generator is a hash of family, version and stream; its
 counter contains the number of the instance. Streams are ``d`` (development, to tune on), ``i``
-(test, to report on) and years such as ``2027-`` (fresh instances).
+(test, to report on) and years such as ``2027-`` (fresh instances, to check a finished method on).
 
-An instance is drawn in two stages. The *structure* (number of goals and links, base, kind of start)
-is drawn once. Positions and angles are drawn again until they break no rule (rejection sampling,
-:func:`broken_rule`). Rejection therefore does not change the frequencies of the structures.
-Positions and angles are drawn as integers, in thousandths. Geometric rules compare integers; the
-other rules use the compiled kernels, which need only IEEE arithmetic
-(:mod:`coartic.motion.kernels.trigonometry`). No rejection depends on a machine's library.
+An instance is drawn in two stages. The *structure* (number of goals and links, base, starting
+postures, direction of a line of goals) is drawn once. Positions and angles are drawn again until
+they break no rule (rejection sampling, :func:`broken_rule`). Rejection therefore does not change
+the frequencies of the structures. Positions and angles are drawn as integers, in thousandths.
+Geometric rules compare integers; the other rules use the compiled kernels, which need only IEEE
+arithmetic (:mod:`coartic.motion.kernels.trigonometry`). No rejection depends on a machine's
+library.
 """
 
 from __future__ import annotations
@@ -57,9 +59,9 @@ from coartic.tasks.task import (
 
 FAMILY_FOLDER = Path(__file__).parent / "families"
 COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}
-"""Default number of instances of each split, counted from instance 0."""
+"""Default number of instances of each split, which begin with instance 0."""
 MAX_ATTEMPTS = 10_000
-"""Largest number of drafts of one instance; a family that needs more cannot be used."""
+"""Largest number of drafts of one instance (:func:`instance_of`)."""
 Base = Literal["free", "rail", "locked"]
 LOCKED: dict[Base, tuple[Literal["x", "y"], ...]] = {
     "free": (),
@@ -86,7 +88,8 @@ def _in_thousandths(value: float) -> int:
 
 
 Thousandths = Annotated[int, BeforeValidator(_in_thousandths)]
-"""A length, an angle or a share: written with up to three decimals, stored in thousandths."""
+"""Type of a length, an angle or a ratio: a number with at most three decimals, which is stored as
+an integer, in thousandths."""
 
 
 def _in_order(limits: tuple[int, int]) -> tuple[int, int]:
@@ -105,22 +108,26 @@ def _as_share(limits: tuple[int, int]) -> tuple[int, int]:
 
 _ordered = AfterValidator(_in_order)
 Range = Annotated[tuple[Thousandths, Thousandths], _ordered]
-"""Lowest and highest value; every thousandth between them is equally likely."""
+"""Type of a range: the lowest and the highest value. Both values, and all thousandths between them,
+are equally likely."""
 _GoalsCount = Annotated[int, Field(strict=True, ge=2, le=MAX_GOALS)]
 _PerArm = Annotated[int, Field(strict=True, ge=3, le=8)]
 _Bases = tuple[Base, ...]
 
 
 class _Region(FileData):
-    """Region of the goals: a box that contains each instance's own box."""
+    """Region of the goals of a family.
+
+    Without a line of goals, the goals of an instance are drawn in a box, which is itself drawn in
+    the region. Goals on a line are in the region, but not in a box.
+    """
 
     x: Range
     """Lowest and highest x (in length units). At the start the base is at the origin."""
     y: Range
     """Lowest and highest y (in length units)."""
     scale: Annotated[Range, AfterValidator(_as_share)] = (_PARTS, _PARTS)
-    """Smallest and largest ratio of the sides of an instance's own box to the sides of the
-    region."""
+    """Smallest and largest ratio of the sides of the box to the sides of the region."""
 
 
 class _Alignment(FileData):
@@ -133,12 +140,12 @@ class _Alignment(FileData):
     steps: Range
     """Smallest and largest distance from goal to goal along the line (in length units)."""
     off: Range
-    """Smallest and largest distance of that goal from the line, to either side (in length
-    units)."""
+    """Smallest and largest distance of the goal that is off the line from the line (in length
+    units). Both sides of the line are equally likely."""
 
 
 class Posture(FileData):
-    """Posture of an arm at the start."""
+    """Distribution of the posture of an arm at the start."""
 
     first: Range
     """Smallest and largest angle of the first joint, measured from +x (in rad)."""
@@ -150,7 +157,7 @@ _PARKED = Posture(first=(0, 0), others=(0, 0))
 
 
 class Postures(FileData):
-    """Postures of both arms at the start.
+    """Distributions of the postures of both arms at the start.
 
     An arm without an entry is straight along +x.
     """
@@ -179,14 +186,15 @@ class Family(FileData):
     goals: Annotated[tuple[_GoalsCount, _GoalsCount], _ordered]
     """Smallest and largest number of goals; each number is equally likely."""
     links: Annotated[tuple[_PerArm, _PerArm], _ordered]
-    """Smallest and largest number of links of each arm. All links have the same length (to a
-    thousandth)."""
+    """Smallest and largest number of links of each arm. Both arms of an instance have the same
+    number. All links have the same length (to a thousandth)."""
     reach: Thousandths = 4 * _PARTS
     """Sum of the lengths of the links of each arm (in length units). The default is the paper's."""
     base: Annotated[_Bases, Field(min_length=1)]
-    """Bases. Each instance has one of them: free, on a rail (it cannot move in y), or locked."""
+    """Kinds of base, equally likely: ``"free"``, ``"rail"`` (the base cannot move in y) or
+    ``"locked"``. Each instance has one of them."""
     restrictions: _Bases = ()
-    """Bases with which every instance can be completed, in addition to its own base."""
+    """Kinds of base with which every instance can be completed, in addition to its own."""
     radius: Thousandths = 100
     """Radius of every goal (in length units)."""
     region: _Region
@@ -194,28 +202,30 @@ class Family(FileData):
     line: _Alignment | None = None
     """Goals on a line: table ``[line]``. Without this table goals are scattered in the region."""
     start: Annotated[tuple[Postures, ...], Field(min_length=1)]
-    """Starting postures. Each instance has one of them: tables ``[[start]]``."""
+    """Distributions of the postures at the start: tables ``[[start]]``. Each instance is drawn from
+    one of them; all are equally likely."""
     initial_hands: InitialPolicy = INITIAL_POLICIES[0]
-    """Policy that finds the hands of trial 0, ``"best-single-hand"`` or ``"best-of-all"``. The
-    ``initial_hands`` of an instance are the hands that the policy found."""
+    """Policy that finds the hand sequence of trial 0, ``"best-single-hand"`` or ``"best-of-all"``.
+    The ``initial_hands`` of an instance are the sequence that the policy found."""
     apart: Thousandths = 300
     """Smallest distance between the centres of two goals (in length units)."""
     clear: Thousandths = 200
-    """Smallest distance of a hand at the start from the rim of a goal (in length units)."""
+    """Smallest distance of a hand at the start from the rim of a goal (in length units). It holds
+    for each of ``hands``."""
     within: Thousandths = 950
-    """Largest distance of a goal from a shoulder, as a share of the reach. Only displacements in
-    locked base coordinates count in the distance."""
+    """Largest distance of a goal from the shoulder of each of ``hands`` at the start, as a fraction
+    of ``reach``. Only coordinates in which the base is locked count in the distance."""
     bent: Thousandths = 200
-    """Angle (in rad). At the start each arm with one of ``hands`` has a joint after its first that
-    is bent by at least this angle."""
+    """Angle (in rad). At the start, the arm of each of ``hands`` has a joint, other than the first,
+    that is bent by at least this angle."""
 
 
 def draft(family: Family, address: Address, attempt: int) -> Task:
-    """Draw the task of an instance in one attempt, without checks.
+    """Draw the task of an instance in one attempt, without checking the family's rules.
 
     The task may break rules of the family (:func:`broken_rule`), and goals may be out of reach.
-    ``initial_hands`` of the task is still a policy instead of a hand sequence. Equal arguments give
-    equal tasks.
+    ``initial_hands`` of the task is the policy of the family, not a hand sequence. Equal arguments
+    give equal tasks.
 
     Parameters
     ----------
@@ -255,10 +265,10 @@ def draft(family: Family, address: Address, attempt: int) -> Task:
 def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list[tuple[int, int]]:
     """Draw goals, and return their x and y in thousandths of a length unit.
 
-    If the family has no line, the goals are in a box whose sides are a drawn share of the region's
-    sides. Otherwise the goals are on a line, possibly outside the region. If there are more than
-    two goals, one goal, which is neither the first nor the last, is moved off the line by the
-    distance ``off``.
+    - Family without a line: the goals are drawn in a box, which is itself drawn in the region.
+    - Family with a line: the goals are on a line, possibly outside the region. If there are more
+      than two goals, one goal, which is neither the first nor the last, is moved off the line by
+      the distance ``off``.
 
     Parameters
     ----------
@@ -294,13 +304,16 @@ def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list
 def broken_rule(family: Family, task: Task) -> str | None:
     """Return the name of the first rule that a draft breaks, or None.
 
+    The names of the rules, in the order in which they are checked, and how a draft breaks them:
+
     - ``outside``: a goal is outside the region.
     - ``overlap``: two goals are too close to each other.
     - ``reach``: a goal is too far from a shoulder, with the base of the draft or of a restriction.
     - ``straight``: an arm is straight at the start, or nearly.
     - ``start-hit``: a hand is in a goal at the start, or close to one.
-    - ``corrective``: the corrective process on its own does not complete the task, with the base of
-      the draft or of a restriction; or there are more than 4096 hand sequences to try.
+    - ``corrective``: the policy of the task finds no hand sequence with which the corrective
+      process on its own completes the task; or this sequence fails with the base of a restriction;
+      or there are more than 4096 sequences to try.
 
     The last four rules consider only the hands of the family.
     """
@@ -408,8 +421,8 @@ def named_by(text: str) -> list[str]:
 
     Both ends are included. If ``text`` is not a range, but for example the name or the file of a
     task, the only entry of the list is ``text`` itself, unchecked. Raises TaskError for a range
-    that is malformed, goes backwards or has more than 10,000 instances. Whether a shipped family
-    exists is not checked.
+    that is malformed, goes backwards or has more than 10,000 instances, and for a range in a family
+    file that cannot be used. For any other family it is not checked whether the family exists.
 
     Examples
     --------
@@ -445,8 +458,8 @@ def shipped_families() -> dict[str, Family]:
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
     """Read families from files, and return a dict that maps their names to the families.
 
-    Raises TaskError for a file that cannot be used, and for a name that is also the name of another
-    family in the files, or of a shipped family.
+    Raises TaskError for a file that cannot be used, and for a name that another of the files, or a
+    shipped family, has as well.
     """
     families: dict[str, Family] = {}
     for path in paths:
@@ -458,10 +471,11 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 
 def load_family(name: str) -> Family:
-    """Return a family by its name, or by the path of its file.
+    """Return the family with a given name, or the family of a file.
 
-    The name of a shipped family includes the version, as in ``two-armed/v1``. A file is read once
-    per process. Raises TaskError if the family does not exist or cannot be used.
+    The name of a shipped family includes the version, as in ``two-armed/v1``. The family of a file
+    is cached: later changes of the file have no effect in the same process. Raises TaskError if the
+    family does not exist or cannot be used.
     """
     if is_file(name):
         return read_family(Path(name))
@@ -472,7 +486,7 @@ def load_family(name: str) -> Family:
 
 
 def is_family(name: str) -> bool:
-    """Return whether a string is the name of a shipped family or a family's file.
+    """Return whether a string names a shipped family or the file of a family.
 
     A ``.toml`` file is the file of a family if it can be read and contains the key ``region``.
     """
@@ -519,10 +533,16 @@ def instance_names(
     year : int, optional
         Year of fresh instances, from 1000 to 9999; None for the other splits.
 
+    Returns
+    -------
+    list of str
+        Names such as ``two-armed/v1/d000``, in the order of the instances.
+
     Raises
     ------
     ValueError
-        The split is unknown, ``count`` is not from 1 to 10,000, or ``year`` does not fit the split.
+        An argument has a wrong type, the split is unknown, ``count`` is not from 1 to 10,000, or
+        ``year`` does not fit the split.
     TaskError
         The family is unknown or cannot be used.
     """

@@ -1,9 +1,11 @@
 """The best known rewards that come with the package, and proven bounds on rewards.
 
-``optima.json`` contains the best reward that any method found for each of the paper's tasks, with
-run ids and solutions. ``best_known.csv`` contains the best rewards for test instances of families,
-and ``best_in_noise.csv`` contains the fewest mean ticks known for tasks with motor noise. The study
-``studies/optima`` copies better rewards from results folders, and proves the bounds.
+- ``optima.json`` contains the best known rewards of the paper's tasks, also with further locks of
+  the base or a still idle arm, with run ids and solutions.
+- ``best_known.csv`` contains the best known rewards of test instances of families.
+- ``best_in_noise.csv`` contains the fewest mean ticks known for tasks with motor noise 0.01.
+
+The study ``studies/optima`` copies better rewards from results folders, and proves the bounds.
 """
 
 from __future__ import annotations
@@ -20,19 +22,20 @@ from coartic.model import PAPER, MotionModel, same_world
 from coartic.tasks.task import Task
 
 BASE = "task"
-"""Value of ``base`` (:func:`entries`) in an entry without additional locks of the base. Rewards are
-compared with this entry."""
+"""Value of the key ``base`` in entries without additional locks of the base (:func:`entries`).
+:func:`best_shipped` uses only such entries."""
 DATA = Path(__file__).with_name("optima.json")
 """Entries of the paper's tasks (:func:`entries`)."""
 BEST_KNOWN = Path(__file__).with_name("best_known.csv")
 """Columns ``instance``, ``reward``, ``bound`` (empty if nothing is proven), ``nodes`` (of the
 search that proved the bound), ``hands`` and ``essence`` (:func:`task_hash`)."""
 BEST_IN_NOISE = Path(__file__).with_name("best_in_noise.csv")
-"""Columns ``task``, ``motor_noise`` (length units of the base, rad), ``mean_ticks`` over 1,000
-executions, its ``standard_error``, ``hands``, the ``method`` of the solution and ``essence``."""
+"""Columns ``task``, ``motor_noise`` (in length units and rad), ``mean_ticks`` (mean over 1,000
+executions), ``standard_error`` of the mean, ``hands``, ``method`` (id of the method that found the
+solution) and ``essence`` (:func:`task_hash`)."""
 
 HASHED_FIELDS = ("start", "radius", "hands", "locked_base", "robot")
-"""Fields that, with the goals, define a task."""
+"""Fields of a task on which :func:`task_hash` depends, in addition to the goals."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,8 @@ class KnownOptimum:
     """The best known reward of a task under a motion model, and its proven bound."""
 
     reward: int | float
-    """Total reward: minus the ticks, an integer; with motor noise, minus the mean ticks of 1,000
-    executions. Both arms may move."""
+    """Total reward of the best known solution: minus its ticks, an integer. With motor noise it is
+    minus the mean ticks of 1,000 executions, a float. Both arms may move."""
     bound: int | None
     """Reward that no solution exceeds; None if nothing is proven."""
     hands: str = ""
@@ -49,15 +52,15 @@ class KnownOptimum:
 
     @property
     def proven(self) -> bool:
-        """True if a proof shows that no solution has a better reward."""
+        """True if the reward equals its proven bound, so that no solution is better."""
         return self.bound == self.reward
 
 
 def task_hash(task: Task) -> str:
-    """Return a hash of what defines a task: 16 hex digits.
+    """Return a hash of the fields that define a task: 16 hex digits.
 
     The hash depends on start, goals, radius, hands, locked base and robot. It does not depend on
-    the task's name and initial hands.
+    other fields, such as the name and the initial hands.
     """
     content = task.model_dump(mode="json")
     text = json.dumps({key: content[key] for key in ("goals", *HASHED_FIELDS)}, sort_keys=True)
@@ -67,8 +70,8 @@ def task_hash(task: Task) -> str:
 def best_shipped(task: Task, model: MotionModel = PAPER) -> KnownOptimum | None:
     """Look up the best known reward of a task under a motion model.
 
-    The task is identified by :func:`task_hash`; its name does not matter. The shipped files contain
-    best known rewards for
+    Tasks with equal :func:`task_hash` have the same best known reward, whatever their names. The
+    shipped files contain best known rewards for
 
     - the paper's model, and the paper's model with motor noise 0.01, but no other models;
     - the paper's tasks, and the first 40 test instances of each shipped family (with motor noise
@@ -109,20 +112,21 @@ def entries() -> list[dict[str, Any]]:
     entry is a dict with the keys
 
     - ``task``: name of the task;
-    - ``essence``: :func:`task_hash`, without the restriction;
-    - ``base``: coordinates that are locked, ``y`` or ``xy``; ``task`` for the coordinates that the
-      task itself locks;
-    - ``other_arm``: whether the idle arm is ``free`` or ``still``;
-    - ``run_ids``: ids of the runs;
-    - ``made_by``: versions and the date.
+    - ``essence``: :func:`task_hash` of the task without the restriction;
+    - ``base``: base coordinates that are locked, ``y`` or ``xy``; the value ``task`` stands for
+      the coordinates that the task itself locks;
+    - ``other_arm``: ``free`` if the idle arm may move, ``still`` if it may not;
+    - ``run_ids``: list of the ids of the runs of the searches;
+    - ``made_by``: dict with the versions of coartic and Python, the commit, a hash of the code, and
+      the date of the runs.
 
     If a solution is known, there are also
 
-    - ``reward`` and ``hands``: of the best solution;
+    - ``reward`` and ``hands``: reward and hand sequence of the best solution;
     - ``bound``: reward that no solution exceeds;
-    - ``searches``: best reward of each search, by its id at the time;
+    - ``searches``: dict that maps the id that each search had at the time to its best reward;
     - ``solution``: a list ``[goal, hand, kind, target, waypoints]`` for each movement;
-    - ``nodes``, in one entry: number of nodes of the search that proved the bound.
+    - ``nodes``, only in one entry: number of nodes of the search that proved the bound.
 
     Otherwise the entry has the key ``infeasible``: the reason why no search found a solution.
     """

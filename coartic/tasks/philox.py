@@ -21,7 +21,7 @@ _WEYL = 0x9E3779B9, 0xBB67AE85  # golden ratio, sqrt(3) - 1
 
 
 def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
-    """Return four random words of 32 bits: a function of a counter and a key.
+    """Return four random words of 32 bits, computed from a counter and a key.
 
     The counter consists of four words of 32 bits, and the key consists of two. Equal arguments give
     equal words.
@@ -57,8 +57,8 @@ class Draws:
     key : tuple of int
         Key of the generator, two words of 32 bits.
     *counter : int
-        The last three words of the generator's counter, of 32 bits each. The first word counts the
-        blocks of four random words that were used.
+        The last three words of the generator's counter, of 32 bits each. The first word is the
+        number of the block of four random words, from 0.
     """
 
     def __init__(self, key: tuple[int, int], *counter: int) -> None:

@@ -1,7 +1,7 @@
 """Tasks: a start, a sequence of goals, and the sources of their numbers.
 
-A task is read from a TOML file. The shipped files are in ``paper``; users' files have the same
-form.
+Tasks are read from TOML files, or made in Python. The shipped files are in the folder ``paper``;
+users' files have the same keys.
 """
 
 from __future__ import annotations
@@ -37,10 +37,11 @@ TASK_FOLDER = Path(__file__).parent / "paper"
 MAX_GOALS = 256
 MAX_NAME_LENGTH = 64
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
-"""Form of the names of tasks and suites, which become file names and parts of commands."""
+"""Regular expression for names of suites, and for names of tasks that are not in a family. Such
+names become names of files and parts of commands."""
 _IN_FAMILY = r"^([a-z][a-z0-9-]*/v[1-9][0-9]?/)?"
 TASK_PATTERN = _IN_FAMILY + NAME_PATTERN.removeprefix("^")
-"""Form of the names of tasks, including instances of a family."""
+"""Regular expression for names of tasks, including the names of instances of a family."""
 _ADDRESS = re.compile(_IN_FAMILY.removesuffix("?") + r"([di]|[0-9]{4}-)([0-9]{3,6})")
 WITHOUT_REACH = "without reach"
 
@@ -48,7 +49,7 @@ Point = tuple[Finite, Finite]
 
 
 def hands_of(letters: str) -> tuple[Hand, ...]:
-    """Return the names of hands from their letters: ``("right", "left")`` for ``"RL"``.
+    """Convert a hand sequence to the names of its hands: ``"RL"`` to ``("right", "left")``.
 
     Raises ValueError for any other letter.
     """
@@ -62,10 +63,7 @@ def hands_of(letters: str) -> tuple[Hand, ...]:
 
 
 def letters_of(hands: tuple[Hand, ...] | list[Hand]) -> str:
-    """Return the first letters of hands: ``"RL"`` for ``("right", "left")``.
-
-    The paper writes hand sequences in this form.
-    """
+    """Convert names of hands to a hand sequence: ``("right", "left")`` to ``"RL"``."""
     return "".join(hand[0].upper() for hand in hands)
 
 
@@ -79,8 +77,8 @@ class Address(NamedTuple):
     family: str
     """Name of the family with its version, such as ``two-armed/v1``."""
     stream: str
-    """``d`` (development), ``i`` (test) or a year such as ``2027-`` (fresh). In a task's name the
-    number of the instance follows it."""
+    """``d`` (development), ``i`` (test) or a year such as ``2027-`` (fresh). In the name of a task,
+    the stream stands before the number of the instance."""
     number: int
     """Number of the instance, from 0."""
 
@@ -88,9 +86,9 @@ class Address(NamedTuple):
     def split(self) -> Split:
         """Split of the instance.
 
-        - ``"development"``: to tune on;
-        - ``"test"``: to report on;
-        - ``"fresh"``: drawn after both were done.
+        - ``"development"``: to tune a method on;
+        - ``"test"``: to report results on;
+        - ``"fresh"``: to check a finished method on.
         """
         return SPLITS.get(self.stream, "fresh")
 
@@ -117,13 +115,13 @@ def address_of(name: str) -> Address | None:
 
 
 class Provenance(FileData):
-    """Source of a number of a task: a value of the dict ``Task.provenance``."""
+    """Source of the numbers of a field of a task (:attr:`.Task.provenance`)."""
 
     status: Literal["published", "inferred", "chosen"]
-    """Whether the number is published in the paper, inferred from the paper, or chosen by the
+    """Whether the numbers are published in the paper, inferred from the paper, or chosen by the
     task's author."""
     source: Line
-    """Section or figure of the paper, or the person who chose the number, in one line."""
+    """Where the numbers come from, in one line, such as a section or figure of the paper."""
 
 
 class Start(FileData):
@@ -132,8 +130,8 @@ class Start(FileData):
     base: Point = (0.0, 0.0)
     """Centre of the base (in length units)."""
     left: Annotated[tuple[Finite, ...], Field(max_length=MAX_LINKS)]
-    """Angles of the joints of the left arm (in rad), one for each link. The first is measured from
-    +x, each other from the link before."""
+    """Angles of the joints of the left arm (in rad), one for each link. The first angle is measured
+    from +x, each other angle from the previous link."""
     right: Annotated[tuple[Finite, ...], Field(max_length=MAX_LINKS)]
     """Angles of the joints of the right arm, as for the left arm."""
 
@@ -145,8 +143,8 @@ class Task(FileData):
     changed. In Python a configuration ``q0=``, shape ``(dof,)``, can be passed instead of
     ``start``: ``Task(goals=[(3, 2), (4.5, 2)], q0=np.zeros(10))``.
 
-    Source of the shipped tasks: paper, section *Experiments*. ``provenance`` contains the source of
-    each number.
+    Source of the shipped tasks: paper, section *Experiments*. ``provenance`` contains the sources
+    of the numbers.
     """
 
     name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=MAX_NAME_LENGTH)] = "unnamed"
@@ -172,8 +170,8 @@ class Task(FileData):
     robot: Robot = Robot()
     """Geometry of the robot if it differs from the paper's (table ``[robot]`` of the file)."""
     provenance: dict[str, Provenance] = Field(default_factory=dict)
-    """Source and status of the numbers, by key. A number without an entry was chosen by the task's
-    author."""
+    """Dict that maps the names of fields to the source and status of their numbers. The numbers of
+    a field without an entry were chosen by the task's author."""
 
     @cached_property
     def q0(self) -> Array:
@@ -193,7 +191,7 @@ class Task(FileData):
         """Return a copy with the changed fields of ``update``, without a check.
 
         With ``deep`` the result is a deep copy. The arrays ``q0`` and ``goal_array`` of the copy
-        follow from the changed fields.
+        are computed from its own fields.
         """
         copied = super().model_copy(update=update, deep=deep)
         for name in ("q0", "goal_array"):
@@ -212,7 +210,7 @@ class Task(FileData):
 
     @property
     def family(self) -> str | None:
-        """Name of the family with its version if the task is an instance; otherwise None."""
+        """Name of the family with its version, from the name of an instance; otherwise None."""
         address = address_of(self.name)
         return address and address.family
 
@@ -220,16 +218,15 @@ class Task(FileData):
     def split(self) -> Split | None:
         """Split of an instance of a family: ``"development"``, ``"test"`` or ``"fresh"``.
 
-        The split follows from the form of the task's name. The split is None if the name is of
-        another form.
+        The split follows from the form of the task's name. It is None if the name is not of the
+        form of an instance.
         """
         address = address_of(self.name)
         return address and address.split
 
     @property
     def reconstructed(self) -> tuple[str, ...]:
-        """Keys in ``provenance`` whose numbers were inferred from the paper, such as
-        ``"goals"``."""
+        """Names of the fields whose numbers were inferred from the paper, such as ``"goals"``."""
         return tuple(k for k, entry in self.provenance.items() if entry.status == "inferred")
 
     @model_validator(mode="before")
@@ -309,9 +306,9 @@ class Task(FileData):
     def save(self, path: str | Path, *, replace: bool = False) -> None:
         """Write the task as a TOML file.
 
-        With ``replace`` an existing file is overwritten. Raises CoarticError if the name does not
-        end in ``.toml``, if the file exists and ``replace`` is False, or if the file cannot be
-        written.
+        If ``replace`` is True, an existing file is overwritten. Raises CoarticError if the name
+        does not end in ``.toml``, if the file exists and ``replace`` is False, or if the file
+        cannot be written.
         """
         file = folder_named(path, "the name of a task's file")
         if file.suffix != ".toml":
@@ -355,8 +352,8 @@ class Task(FileData):
 def check_hands(task: Task, hands: str) -> str:
     """Check a hand sequence, such as ``"RRLR"``, and return it unchanged.
 
-    Raises ValueError unless ``hands`` is a string that contains, for each goal, the letter of one
-    of the task's hands.
+    Raises ValueError if ``hands`` is not a string with one letter for each goal, or if a letter is
+    not that of one of the task's hands.
     """
     allowed = letters_of(sorted(task.hands))
     fits = isinstance(hands, str) and len(hands) == len(task.goals)
@@ -372,7 +369,8 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
     """Return a sentence on the first goal that is out of reach, or None.
 
     A goal is out of reach if no hand of the task can come within ``tolerance`` (in length units) of
-    its centre, or if the hand that ``initial_hands`` names for the goal cannot.
+    its centre. It is also out of reach if the hand that ``initial_hands`` names for the goal cannot
+    come that near.
     """
     named = None if task.initial_is_policy else hands_of(task.initial_hands)
     for index, goal in enumerate(task.goals):
@@ -392,11 +390,12 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
 
 
 def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float:
-    """Return how far a goal is out of a hand's reach (length units).
+    """Return how far a goal is out of a hand's reach (in length units).
 
-    The result is above 0 if the goal is out of reach, and otherwise at most 0. The hand can be at a
-    certain range of distances from its shoulder. The result is the distance of the goal's centre
-    from this range, minus ``tolerance``. Base coordinates that are not locked can take any value.
+    The result is at most 0 if the hand can come within ``tolerance`` of the goal's centre.
+    Otherwise it is the smallest possible distance of the hand from the centre, minus ``tolerance``.
+    The hand can be at any distance from its shoulder between the two distances of
+    :meth:`.Robot.reach`, and base coordinates that are not locked can take any value.
     """
     arm = task.robot.arm(hand)
     near, far = task.robot.reach(hand)
@@ -411,9 +410,9 @@ def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float
 def check_task(task: Task) -> Task:
     """Check that all goals of a task can be reached, and return the task.
 
-    The paper's corrective process ends within a tenth of the radius from a goal's centre. Raises
-    TaskError if no hand of the task can come that near to a goal, or if the hand that
-    ``initial_hands`` names for a goal cannot come that near to it.
+    The paper's corrective process converges when the hand is within a tenth of the radius of a
+    goal's centre. Raises TaskError if no hand of the task can come that near to a goal, or if the
+    hand that ``initial_hands`` names for a goal cannot.
     """
     _, tolerance = PAPER.tolerances(task.radius)
     if (problem := _out_of_reach(task, tolerance)) is not None:
@@ -450,7 +449,8 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     source : str
         Name of the content in error messages, such as the path of the file.
     reach : bool
-        True to refuse goals that are out of reach.
+        True to refuse a task with a goal that cannot be hit by any of its hands, or by the hand
+        that ``initial_hands`` names for the goal.
 
     Returns
     -------
@@ -460,7 +460,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     Raises
     ------
     TaskError
-        The content is not a task.
+        The content is not that of a task, or a goal is out of reach.
     """
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
@@ -469,7 +469,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
 
 
 def _all_keys() -> list[str]:
-    """Return the keys of a task file in all its tables, without ``q0``."""
+    """Return the keys of task files, including the keys in tables, without ``q0``."""
     robot = [field.name for field in fields(Robot)]
     return [*Task.model_fields, *Start.model_fields, *robot, *Provenance.model_fields]
 
@@ -494,9 +494,9 @@ def task_text(task: Task) -> str:
 def _toml_value(value: Any) -> str:
     """Return a value in the notation of TOML.
 
-    The value is a string of printable characters, a number, a list without dictionaries, or a
-    dictionary of such values. A dictionary becomes an inline table with bare keys. Any other value
-    is written as in JSON.
+    The value is a string of printable characters, a number, a list without dicts, or a dict that
+    maps bare keys to such values. A dict becomes an inline table; any other value is written as in
+    JSON.
     """
     if isinstance(value, dict):
         return (

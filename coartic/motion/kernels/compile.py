@@ -1,10 +1,10 @@
 """Kernels: functions that Numba compiles when they are first called.
 
 Numba is imported at the first call of a kernel, so that a command that only lists names does not
-need it. The machine code is stored on disk. Numba compiles a cached function again only if the file
-of this function has changed. Numba would miss a change of another file that defines a function
-called by this function. So here the name of the folder of the machine code contains a hash of all
-files that define kernels. If one of these files changes, all kernels are compiled again.
+need it. The machine code is stored on disk. Numba compiles a stored function again if the file of
+this function has changed, but not if the function calls a function in another file, and only that
+file has changed. Therefore the name of the folder of the machine code contains a hash of
+:data:`KERNEL_FILES`. If one of these files changes, all kernels are compiled again.
 """
 
 from __future__ import annotations
@@ -44,12 +44,15 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def python_files(*folders: str) -> list[Path]:
-    """Return the Python files in folders of the package ``coartic``, also in their subfolders."""
+    """Return the sorted paths of the Python files in folders of ``coartic``.
+
+    Files in subfolders are included.
+    """
     return sorted(path for folder in folders for path in (PACKAGE / folder).rglob("*.py"))
 
 
 def hash_of_files(files: Iterable[Path]) -> str:
-    """Return 16 hex digits of the SHA-256 of file names and contents."""
+    """Return a hash of the names and contents of files: 16 hex digits of SHA-256."""
     texts = (path.name.encode() + b"\0" + path.read_bytes() for path in files)
     return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
 
@@ -59,9 +62,9 @@ KERNEL_FILES = [
     PACKAGE / "robot.py",
     *(path for path in python_files("motion", "learner") if _DECORATED.search(path.read_bytes())),
 ]
-"""Files that contain code of kernels: the files in ``motion`` and ``learner`` that define kernels,
-and ``robot.py``, whose formulas are compiled as well. A kernel in any other file may call only
-these kernels and kernels of its own file; Numba itself notices changes of its own file."""
+"""The files in ``motion`` and ``learner`` that define kernels, and ``robot.py``, whose formulas are
+compiled as well. A kernel in any other file may call only kernels of these files and of its own
+file, because Numba itself notices changes of its own file."""
 FINGERPRINT = hash_of_files(KERNEL_FILES)
 """Hash of the files of the kernels when this module was imported."""
 
@@ -85,8 +88,7 @@ class _Kernel:
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function, and return its result.
 
-        Raises TypeError for a kernel that only other kernels can call, because Numba makes no entry
-        from Python for it.
+        Raises TypeError for a kernel that only other kernels can call.
         """
         if self.kind not in ("entry", "scalar"):
             raise TypeError(f"{self.function.__name__} can only be called by other kernels")
@@ -114,12 +116,14 @@ inner = _decorator("inner")
 shared = _decorator("shared")
 """An inner kernel that several entries call; its machine code is stored on disk as well."""
 inlined = _decorator("inlined")
-"""An inner kernel that is inlined into its callers and has their error model. Inlining avoids the
-cost of passing large records, and lets the compiler unroll loops over a known shape."""
+"""An inner kernel that is inlined into its callers. A division by 0 has the result that it has in
+the caller. Inlining avoids the cost of passing large records, and lets the compiler unroll loops
+over a known shape."""
 scalar = _decorator("scalar")
 """A kernel with scalar arguments, which Python and other compiled functions may also call."""
 intrinsic: Callable[[Any], Any] = _decorator("intrinsic")
-"""A function that gives the type of a call in a kernel and builds its machine code."""
+"""A function that returns the type of a call in a kernel, and a function that builds the machine
+code of the call."""
 
 
 # ---- What kernels share ----
@@ -151,9 +155,9 @@ _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy
 def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
     """Return the memory addresses through which kernels draw from N > 0 NumPy generators.
 
-    The result has shape ``(N, 3)``. A row contains the addresses of the state and of two C
-    functions of a generator, for :func:`generator_at`. The generators must exist until the kernel
-    returns.
+    The result has shape ``(N, 3)``, with a row for each generator. The row contains the address of
+    the generator's state and the addresses of two of its C functions, for :func:`generator_at`. The
+    generators must exist until the kernel returns.
     """
     rows = [
         [ctypes.cast(getattr(c, name), ctypes.c_void_p).value for name in _DRAWS]
@@ -204,8 +208,8 @@ def import_numba() -> Any:
 def _set_up_numba() -> Any:
     """Import Numba, set it up, and return the module.
 
-    LLVM's options change only the speed of kernels. The options have no effect if the program has
-    compiled something else with Numba before.
+    The options that are set for LLVM change only the speed of kernels. They have no effect if the
+    program has compiled something else with Numba before.
     """
     modules: dict[str, Any] = sys.modules
     yaml_module = {"yaml": modules["yaml"]} if "yaml" in modules else {}
@@ -354,16 +358,16 @@ def _remove_old(root: Path, current: Path) -> None:
 
 @cache
 def _command_id() -> int:
-    """Return the id of the process of the command.
+    """Return the process id of the command.
 
-    For a worker it is the id of its parent process, and otherwise of this process.
+    In a worker it is the id of the parent process, and otherwise the id of this process.
     """
     parent = parent_process()
     return (parent.pid if parent else None) or os.getpid()
 
 
 def _log_once(message: str) -> None:
-    """Log a message once per process (logger ``coartic``, level info)."""
+    """Log a message (logger ``coartic``, level info)."""
     logging.getLogger("coartic").info(message)
 
 
@@ -387,8 +391,8 @@ class _MachineCode:
         """Return a signature's machine code, or None if it has to be compiled.
 
         If another process compiles the same code, this process waits for it
-        (:meth:`wait_for_lock`). The first time that code is to be compiled, a message is logged.
-        ``signature`` is as Numba passes it.
+        (:meth:`wait_for_lock`). If code has to be compiled, a message is logged. ``signature`` is
+        as Numba passes it.
         """
         self.unlock()
         code = self.load(*signature)
@@ -425,8 +429,8 @@ class _MachineCode:
 
         The ids of the process and of its command are written into the lock file, unless the disk is
         full. Locking fails if the file cannot be locked, or if another process holds the lock for
-        more than 120 s. After 60 s a message names that process, unless it belongs to the same
-        command.
+        more than 120 s. After 60 s a logged message names that process, unless it belongs to the
+        same command.
         """
         with contextlib.suppress(OSError):
             file = open(f"{self.cache_path}/{self.name}.lock", "a+b", buffering=0)  # noqa: SIM115

@@ -1,12 +1,12 @@
 """The corrective process **A**: find a configuration that hits a goal.
 
-The process is Jacobian-transpose inverse kinematics: gradient descent on the distance of the hand
-from the goal, ``q += α Jᵀ e`` with the error e of the hand (paper, section *The Corrective
-Process*, Figure 2). It uses only the primary objective: where the goal is, and how the position of
-the chosen hand depends on the base and the chosen arm. The joints of the other arm do not change,
-and a locked base coordinate has no column in the Jacobian.
+The process is Jacobian-transpose inverse kinematics: gradient descent on half the squared distance
+of the hand from the goal, ``q += α Jᵀ e``, where e is the vector from the hand to the goal (paper,
+section *The Corrective Process*, Figure 2). It uses only the primary objective: where the goal is,
+and how the position of the chosen hand depends on the base and the chosen arm. The joints of the
+other arm do not change, and a locked base coordinate has no column in the Jacobian.
 
-The kernels make the iterations of the process for many arms side by side.
+The kernels make the iterations of the process for many arms at once.
 """
 
 from __future__ import annotations
@@ -45,10 +45,12 @@ _AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # status of a slot whose correction h
 def _find_statuses(slots: SlotArrays, count: int, square: float) -> None:
     """Set the status of corrections in the first ``count`` slots, in place.
 
-    - at the goal: the squared distance of the hand from the goal's centre is at most ``square`` (in
-      squared length units);
-    - failed: that distance is not finite;
-    - going on: otherwise.
+    The status is
+
+    - at the goal, if the squared distance of the hand from the goal's centre is at most ``square``
+      (in squared length units);
+    - failed, if that distance is not finite;
+    - going on, otherwise.
     """
     tip = len(slots.length)
     for i in range(padded_count(count)):
@@ -65,10 +67,10 @@ def descend(
 ) -> tuple[int, bool]:
     """Make an iteration of the corrective process in the first ``count`` slots, in place.
 
-    Only slots whose status is going on change. If the configuration of such a slot does not change
-    in the iteration, its status becomes stuck. ``find_changes`` is as in :func:`descend_to_goals`.
-    Return how many slots have ended, and whether all link angles are certainly below 1e5 rad in
-    size afterwards.
+    Only the configurations of slots whose status is *going on* change. If the iteration does not
+    change the configuration of such a slot, the status becomes *stuck*. ``find_changes`` is as in
+    :func:`descend_to_goals`. Return how many slots have ended, and whether the absolute values of
+    all link angles are certainly below 1e5 rad afterwards.
     """
     ended = 0
     large = 0
@@ -107,9 +109,10 @@ def descend(
 def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, find_changes: Any) -> None:
     """Iterate the corrective process in the first ``count`` slots until each has ended.
 
-    A correction ends when it has converged or failed. It fails if its configuration is not finite
-    or no longer changes, or after ``max_iterations``. The slots are loaded by :func:`load`, and
-    free afterwards. In the record of each run
+    A correction ends when it has converged or failed. It fails if the distance of the hand from the
+    goal is not finite, if the configuration no longer changes, or after ``max_iterations``
+    iterations. The caller loads the slots by :func:`load`; they are free afterwards. In the record
+    of each run
 
     - ``converged`` is set, and ``iterations`` grows;
     - ``target`` gets the base and the arm of the last iterate, while the entries of the other arm
@@ -179,11 +182,11 @@ def project(v: Any, x: Any, y: Any) -> None:
 def _find_nullspace_changes(slots: SlotArrays, count: int, robot: RobotRecord, runs: Any) -> None:
     """Set ``slots.nullspace_change`` of the first ``count`` slots: steps to preferred postures.
 
-    The step is β N(q) (p − q), and 0 for locked base coordinates:
+    The step is β N(q) (p − q), and 0 for locked base coordinates. Here
 
     - β is the ``nullspace_correction_gain`` of the run in the slot, and p its preferred posture;
-    - q is the slot's configuration, whose positions ``x`` and ``y`` are filled already;
-    - N projects onto the null space of the hand's Jacobian.
+    - q is the slot's configuration; :func:`find_positions` has filled ``x`` and ``y`` for it;
+    - N projects onto the null space of the hand's Jacobian (:func:`project`).
     """
     tip = len(slots.length)
     for i in range(count):
@@ -206,10 +209,10 @@ def _find_nullspace_changes(slots: SlotArrays, count: int, robot: RobotRecord, r
 
 @shared
 def correct_slots_informed(batch: Batch, count: int, robot: RobotRecord) -> None:
-    """Run the corrective process with null-space steps to each run's preferred posture.
+    """Run the corrective process with null-space steps towards each run's preferred posture.
 
-    The process runs in the first ``count`` slots. The results are set in the records of the runs
-    (:func:`descend_to_goals`).
+    The process runs in the first ``count`` slots. The results are written into the records of the
+    runs (:func:`descend_to_goals`).
     """
     descend_to_goals(batch, count, robot, _find_nullspace_changes)
 
@@ -218,19 +221,20 @@ def correct_slots_informed(batch: Batch, count: int, robot: RobotRecord) -> None
 def correct_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
     """Run the paper's corrective process in the first ``count`` slots.
 
-    The results are set in the records of the runs (:func:`descend_to_goals`).
+    The results are written into the records of the runs (:func:`descend_to_goals`).
     """
     descend_to_goals(batch, count, robot, None)
 
 
 @inlined
 def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> int:
-    """Let a corrective process set the ``target`` of each run that it applies to.
+    """Let a corrective process set the ``target`` of each run to which it applies.
 
     The process applies to each of the first ``count`` runs that has missed its goal, whose trial
     goes on, and that may be corrected (``corrects``). ``descend`` is the kernel of the process
-    **A**. In each of the first ``count`` runs ``converged`` becomes True if **A** converged, and
-    ``iterations`` grows. Return to how many runs the process applied.
+    **A**. The field ``converged`` of a run becomes True if **A** applied and converged, and False
+    otherwise. ``iterations`` grows by the iterations of **A**. Return the number of runs to which
+    the process applied.
     """
     slots, slot = batch.slots[0], 0
     for i in range(count):
@@ -258,9 +262,9 @@ def _correct_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> N
       goal, **A** does not converge, or 50 corrections were made.
 
     ``ticks``, ``corrections`` and ``iterations`` of a run become sums over the corrections of the
-    run; ``iterations`` includes those of a process that does not converge. All three become 0 if
-    the run has not missed its goal. ``target`` becomes the last configuration of the last process
-    **A**; it does not change if the run has not missed its goal.
+    run; ``iterations`` includes the iterations of a process that does not converge. All three
+    become 0 if the run is not corrected. ``target`` becomes the last iterate of the last process
+    **A**; it does not change if the run is not corrected.
     """
     for i in range(count):
         run = batch.runs[i]
@@ -287,13 +291,19 @@ def _correct_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> N
 
 @shared
 def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Correct runs that missed the goal by the paper's corrective process (:func:`_correct_by`)."""
+    """Correct runs that missed their goal (:func:`_correct_by`).
+
+    The process is the paper's corrective process (:func:`correct_slots`).
+    """
     _correct_by(count, robot, batch, correct_slots)
 
 
 @shared
 def correct_runs_informed(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Correct runs as :func:`correct_runs` does, with **A** pulled to preferred postures."""
+    """Correct runs that missed their goal, with null-space steps (:func:`_correct_by`).
+
+    The process is that of :func:`correct_slots_informed`.
+    """
     _correct_by(count, robot, batch, correct_slots_informed)
 
 
@@ -301,7 +311,7 @@ def correct_runs_informed(count: int, robot: RobotRecord, batch: Batch) -> None:
 def correct_kernel(robot: NDArray[np.void], batch: Batch) -> None:
     """Run the corrective process for the first run of a batch (:func:`descend_to_goals`).
 
-    ``robot`` comes from :func:`robot_parameters`.
+    ``iterations`` of the run is set to 0 first. ``robot`` comes from :func:`robot_parameters`.
     """
     run = batch.runs[0]
     run.iterations = 0

@@ -8,19 +8,20 @@ q^t is ::
     q^t                             for k = n = ceil(|q^t - q| / m)
 
 where m is the length of a step, and |·| the norm of the motion model. With motor noise q^t is
-displaced (:mod:`coartic.motion.kernels.noise`). Before each step the stopping rule is evaluated. A
+displaced (:mod:`coartic.motion.kernels.noise`). The stopping rule is evaluated at each point. A
 movement ends if
 
-- the chosen hand is within the goal's radius, or
-- the movement is towards a learned or planned target, and the hand is within θ^a of the position to
-  which the target would bring it.
+- the chosen hand is within the goal's radius,
+- the movement is towards a learned or planned target, and the hand is within θ^a of the position
+  that it has at the target, or
+- the point is the last one, q^t.
 
-A movement of k steps takes k + 1 ticks; the last tick detects arrival (inferred: it gives the
-published initial rewards exactly).
+A movement of k steps takes k + 1 ticks; the last tick detects arrival (inferred: this gives exactly
+the initial rewards that follow from the paper).
 
-The kernels move many arms side by side. They skip steps at which the hand certainly cannot be in
-the goal yet (:func:`clear_steps`). The results are those of a loop that evaluates the stopping rule
-at each step.
+The kernels move many arms at once. They skip points at which the movement certainly cannot end
+(:func:`clear_steps`). The results are those of a loop that evaluates the stopping rule at each
+point.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ def largest_square(length: float) -> float:
 
 @inner
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
-    """Return a lower bound of the steps until a hand can enter a disc.
+    """Return a lower bound on the steps before a hand can enter a disc.
 
     The bound is usually not an integer. It is 0 if the hand may be in the disc already.
 
@@ -94,11 +95,12 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
     rim : float
         r: radius of the disc.
     closing : float
-        d u, where u is the closing speed, in length units per step.
+        d u, where u is the speed with which the hand approaches the centre, in length units per
+        step.
     slowness : float
-        1 / s, where s is a bound on the hand's path per step.
+        1 / s, where s is an upper bound on the length of the hand's path per step.
     bend : float
-        c: bound on the change of the hand's velocity per step.
+        c: upper bound on the change of the hand's velocity per step.
 
     Notes
     -----
@@ -131,8 +133,8 @@ def divide_steps(slots: SlotArrays, count: int, model: Any) -> bool:
     """Divide the movements in the first ``count`` slots into steps, in place.
 
     The function sets the rates, bounds and numbers of steps. ``distance``, which :func:`start` has
-    set to the squared length of the movement, becomes the length. Return whether all link angles
-    certainly stay below 1e5 rad in size (:func:`winding`).
+    set to the squared length of the movement, becomes the length. Return whether the absolute
+    values of all link angles certainly stay below 1e5 rad (:func:`winding`).
     """
     large, step = 0, model.step
     # In a step no joint turns by more than the step, and the base moves at most this far.
@@ -228,8 +230,8 @@ def check(slots: SlotArrays, count: int, stop_on_arrival: bool, rims: Any, squar
 def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotRecord) -> None:
     """Move the arms in the first ``count`` slots until each movement has ended (:func:`check`).
 
-    The slots are loaded by :func:`start`, and free afterwards. In the record of each run ``q``,
-    ``hit`` and ``ticks`` are set, and ``evaluations`` grows.
+    The caller loads the slots by :func:`start`; they are free afterwards. In the record of each run
+    ``q``, ``hit`` and ``ticks`` are set, and ``evaluations`` grows.
     """
     slots, evaluations, step = batch.slots[0], 0, robot.model.step
     rims = robot.radius, robot.model.arrival_tolerance
@@ -273,8 +275,8 @@ def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotReco
 def move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> None:
     """Move each of the first ``count`` runs that is ``acting`` to its ``end``, in place.
 
-    A movement ends on a hit or at its end. If ``stops`` is True, a movement also ends when the hand
-    is near the position that it has at the end of the movement.
+    A movement ends on a hit or at its ``end``. If ``stops`` is True, a movement also ends when the
+    hand is within ``arrival_tolerance`` of the position that it has at ``end``.
     """
     slots, slot = batch.slots[0], 0
     for i in range(count):
@@ -287,11 +289,11 @@ def move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> No
 
 @inlined
 def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Perform the next ``action`` of each of the first ``count`` runs, unless it is a path.
+    """Perform the next ``action``, except paths, of the first ``count`` runs.
 
-    :data:`IDLE` lists the actions. ``q``, ``hit``, ``ticks``, ``evaluations`` and ``acting`` change
-    in place. Ticks are 0 if there is no movement. With noise, the end of a movement to a target is
-    displaced.
+    The actions are listed at :data:`IDLE`. ``q``, ``hit``, ``ticks``, ``evaluations``, ``acting``
+    and ``end`` change in place. After ``IDLE`` and ``CHECK`` the ticks are 0. With noise, ``end``
+    of a movement to a target is displaced.
     """
     for i in range(count):
         run = batch.runs[i]
@@ -317,9 +319,9 @@ def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 def _corner(run: RunRecord, waypoints: Any, k: int, j: int, noisy: bool) -> Any:
     """Return entry ``j`` of corner ``k`` of a path.
 
-    Corner -1 is the present configuration of the run, corner k >= 0 is waypoint k. With noise,
-    ``run.end`` contains the displacement of the last waypoint; an entry is NaN if no waypoint moves
-    this coordinate.
+    Corner -1 is the present configuration of the run, and corner k >= 0 is waypoint k (from 0).
+    With noise, ``run.end`` contains the displacement of the last waypoint; an entry of it is NaN if
+    no waypoint moves the coordinate.
     """
     if k < 0 or (noisy and math.isnan(run.end[j])):
         return run.q[j]
@@ -332,9 +334,10 @@ def _corner(run: RunRecord, waypoints: Any, k: int, j: int, noisy: bool) -> Any:
 def _sum_of_squares(
     run: RunRecord, waypoints: Any, k: int, entries: Any, noisy: bool, weight: float
 ) -> float:
-    """Return the squared distance over some entries between two corners of a path.
+    """Return the squared distance between corners ``k`` - 1 and ``k`` of a path.
 
-    The corners are ``k`` - 1 and ``k``. Base coordinates are multiplied by ``weight`` first.
+    Only the coordinates in ``entries`` count. Differences of base coordinates are multiplied by
+    ``weight`` first.
     """
     square = 0.0
     for j in entries:
@@ -376,11 +379,11 @@ def _segment_length(run: RunRecord, waypoints: Any, k: int, model: Any) -> float
 def follow(run: RunRecord, waypoints: Any, robot: RobotRecord, slots: SlotArrays) -> None:
     """Move a run along a path, until its hand hits or the path ends.
 
-    ``waypoints`` has shape ``(W, dof)``. Point k of n = ceil(length / m) lies k m along the path;
-    point n is the last waypoint. With noise, one displacement is drawn, and waypoint k of W is
-    displaced by k / W times that displacement, in the coordinates that any waypoint moves. ``q``,
-    ``hit`` and ``ticks`` of the run are set, and ``evaluations`` grows by one for each point. Slot
-    0 is work space.
+    ``waypoints`` has shape ``(W, dof)``. The path has n = ceil(length / m) steps. Point k < n lies
+    at arc length k m, and point n is the last waypoint. With noise, one displacement is drawn, and
+    waypoint k of W (from 1) is displaced by k / W times that displacement, in the coordinates that
+    any waypoint moves. ``q``, ``hit`` and ``ticks`` of the run are set, and ``evaluations`` grows
+    by one for each point up to the end of the movement. Slot 0 is work space.
     """
     model, last = robot.model, len(waypoints) - 1
     noisy = model.motor_noise > 0.0
@@ -467,10 +470,9 @@ def path_kernel(robot: NDArray[np.void], waypoints: Any, batch: Batch) -> None:
 
 @entry
 def move_kernel(stop_on_arrival: bool, robot: NDArray[np.void], batch: Batch) -> None:
-    """Move the first run of a batch towards its target.
+    """Move the first run of a batch to its ``target``, without noise (:func:`move_slots`).
 
-    ``robot`` comes from :func:`robot_parameters`; :func:`move_slots` says what is set in the run's
-    record.
+    ``robot`` comes from :func:`robot_parameters`.
     """
     run = batch.runs[0]
     fill_row(run.end, run.target)

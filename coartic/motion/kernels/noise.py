@@ -10,12 +10,12 @@ So no number depends on the order of trials, on the other runs of a batch or on 
 threads. Two solutions that are executed with the same seed and the same draw are executed with the
 same noise (*common random numbers*).
 
-The arguments are hashed one after another by SplitMix64 (Steele, Lea & Flood 2014, *Fast splittable
-pseudorandom number generators*, OOPSLA). The inverse distribution function of the normal
-distribution converts the hash to a normal number, by algorithm AS 241 (Wichura 1988, *The
-percentage points of the normal distribution*, Applied Statistics 37:477-484; relative error 1e-16).
-The logarithm in this algorithm is computed as a series, because the logarithms of C libraries
-differ between systems in the last bit.
+SplitMix64 (Steele, Lea & Flood 2014, *Fast splittable pseudorandom number generators*, OOPSLA)
+hashes the arguments one after another. Algorithm AS 241, which computes the quantile function of
+the normal distribution, converts the hash to a normal number (Wichura 1988, *The percentage points
+of the normal distribution*, Applied Statistics 37:477-484; relative error 1e-16). The logarithm in
+this algorithm is computed as a series, because the logarithms of C libraries differ between systems
+in the last bit.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _LN_2 = math.log(2.0)
 
 @inner
 def hashed(word: Any, number: int) -> Any:
-    """Hash a 64-bit word and an integer from 0 by SplitMix64."""
+    """Hash a 64-bit word and a non-negative integer by SplitMix64."""
     mixed = word + _GOLDEN * (_WORD(number) + _WORD(1))
     mixed = (mixed ^ (mixed >> _30)) * _FIRST
     mixed = (mixed ^ (mixed >> _27)) * _SECOND
@@ -67,7 +67,7 @@ def _logarithm(x: float) -> float:
 
 @inner
 def normal_of(word: Any) -> float:
-    """Return the standard normal number of a 64-bit word that is uniformly distributed."""
+    """Convert a uniformly distributed 64-bit word to a standard normal number."""
     uniform = (float(word >> _12) + 0.5) * _UNIT  # between 0 and 1, exact
     centred = uniform - 0.5
     if abs(centred) <= 0.425:
@@ -118,7 +118,9 @@ def miss_target(run: RunRecord, robot: RobotRecord) -> None:
     """Displace the ``end`` of a run's aimed movement by noise, in place.
 
     Coordinate c moves if its target t_c differs by more than 1e-9 from its present value. A
-    coordinate that moves ends at t_c + s z_c. All other coordinates do not change.
+    coordinate that moves ends at t_c + s z_c. All other coordinates keep their present values. If
+    ``robot.grows`` is True, s min(1, L) takes the place of s. Here L is the Euclidean distance from
+    the present configuration to the target.
     """
     sd, key = robot.model.motor_noise, _key_of_movement(run)
     if robot.grows:
@@ -132,9 +134,11 @@ def miss_target(run: RunRecord, robot: RobotRecord) -> None:
 def displace_path(run: RunRecord, waypoints: Any, robot: RobotRecord) -> None:
     """Draw the noise of a path: the displacement of its last waypoint, in place.
 
-    The displacement becomes the ``end`` of the run. The displacement is s z_c in each coordinate c
-    that any of the ``waypoints``, shape ``(W, dof)``, moves, and NaN in all other coordinates. The
-    ``target`` of the run is the last waypoint.
+    The displacement becomes the ``end`` of the run. It is s z_c in each coordinate c that any of
+    the ``waypoints``, shape ``(W, dof)``, moves, and NaN in all other coordinates. If
+    ``robot.grows`` is True, s min(1, L) takes the place of s. Here L is the Euclidean distance from
+    the present configuration to the last waypoint. The caller has set the ``target`` of the run to
+    the last waypoint.
     """
     sd, key = robot.model.motor_noise, _key_of_movement(run)
     if robot.grows:

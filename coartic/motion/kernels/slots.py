@@ -1,8 +1,8 @@
-"""Data layout with which the compiled kernels move many arms side by side.
+"""Data layout with which the compiled kernels move many arms at once.
 
 - A *run* is a robot that makes a trial. A *batch* contains a record for each of its runs.
-- A *slot* is a column of some arrays. It holds the arm of a run while the arm moves or is corrected
-  (structure of arrays).
+- A *slot* is a column of some arrays (structure of arrays). It contains the data of the arm of one
+  run while the arm moves or is corrected.
 
 The innermost loop of a kernel is over slots, so that the compiler turns it into vector
 instructions. The number of links belongs to the type of the arrays, so that loops over links are
@@ -45,16 +45,16 @@ SlotArrays = Any
 def _links_for(robot: Robot) -> int:
     """Return the number of links per arm for which a robot's kernels are compiled.
 
-    The number is rounded up to 4 or 8, so that most robots share machine code. For arms with more
-    than 8 links it is :attr:`Robot.max_links`.
+    The number is :attr:`Robot.max_links`, rounded up to 4 or 8 if it is at most 8. So most robots
+    share machine code.
     """
     return 4 if robot.max_links <= 4 else max(robot.max_links, 8)
 
 
 def width_of(robot: Robot) -> int:
-    """Return the number of entries of a robot's configuration in records of kernels.
+    """Return the number of entries of a configuration in the records of kernels.
 
-    The width is the number of base coordinates plus the joints of two arms, each with the number of
+    The number is that of the base coordinates plus the joints of two arms, each with the number of
     links for which the kernels are compiled (:func:`_links_for`). The first ``dof`` entries are the
     robot's configuration; the other entries are unused.
     """
@@ -107,8 +107,8 @@ def robot_parameters(
     model : MotionModel
         The motion model. Tolerances that are None are replaced by a tenth of ``radius``.
     checks : bool
-        True if an arm without a target does not move when its hand is in its goal already; False if
-        the corrective process begins at once.
+        True if an arm without a target stays where it is when its hand is in its goal already;
+        False if the corrective process begins at once.
     grows : bool
         True if the motor noise of aimed movements grows with their length.
 
@@ -159,8 +159,8 @@ class Batch(NamedTuple):
     slots: Any
     """The arrays of the slots (:data:`SlotArrays`): a record in an array of shape ``(1,)``."""
     corrected: Any
-    """The rows of ``slots`` that a correction needs, in the same memory, shape ``(rows, SLOTS)``.
-    Only copy columns: some rows hold integers."""
+    """The rows of ``slots`` that a correction needs, shape ``(rows, SLOTS)``: a view of ``slots``
+    as floats. Only copy its columns, because some rows contain integers."""
     moved: Any
     """The rows of ``slots`` that a movement needs, in the same form."""
 
@@ -169,8 +169,7 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
     """Return a new batch for kernels, with all entries 0.
 
     The batch consists of ``count`` records of runs with room for the links of ``robot``, and of
-    arrays of 72 slots (:data:`SLOTS`). Each run needs a slot, so a kernel moves at most 72 runs at
-    a time.
+    arrays of 72 slots (:data:`SLOTS`). Each run needs a slot, so ``count`` must be at most 72.
     """
     width = width_of(robot)
     fields = {
@@ -212,7 +211,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     Parameters
     ----------
     links : int
-        Number of links of each arm. Shorter arms end in links of length 0.
+        Number of links in the arrays. A shorter arm is filled up with links of length 0.
 
     Returns
     -------
@@ -287,7 +286,7 @@ def load(slots: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) ->
 def squared_distance(run: RunRecord) -> float:
     """Return the squared Euclidean distance from a run's configuration to its target.
 
-    Under every motion model, postures are compared by this distance.
+    The distance does not depend on the norm and the weight of the base of the motion model.
     """
     square = 0.0
     for j in range(len(run.q)):
@@ -368,10 +367,10 @@ def padded_count(count: int) -> int:
 
 @inlined
 def winding(q: Any, slot: int) -> float:
-    """Return an upper bound on the absolute link angles of an arm (in rad).
+    """Return an upper bound on the sizes of the link angles of an arm (in rad).
 
-    The bound is the sum of the sizes of the joint angles of the arm in a slot. ``q`` contains a
-    column for each slot.
+    Link angles are measured from +x. The bound is the sum of the absolute values of the joint
+    angles of the arm in ``slot``. ``q`` has a column for each slot.
     """
     total = 0.0
     for k in range(len(q) - BASE_DOF):
@@ -383,8 +382,8 @@ def winding(q: Any, slot: int) -> float:
 def have_small_angles(slots: SlotArrays, count: int) -> bool:
     """Return whether all link angles in the first ``count`` slots are certainly below 1e5 rad.
 
-    Angles are absolute, from +x (:func:`winding`). Slots beyond ``count`` that are computed to fill
-    a vector are included (:func:`padded_count`).
+    The condition is on the sizes of the angles, measured from +x (:func:`winding`). Slots beyond
+    ``count`` that are computed to fill a vector are included (:func:`padded_count`).
     """
     large = 0
     for i in range(padded_count(count)):
@@ -393,11 +392,11 @@ def have_small_angles(slots: SlotArrays, count: int) -> bool:
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
-    """Return a kernel that writes the positions of shoulder, joints and hand into its slots.
+    """Return a kernel that computes the positions of shoulder, joints and hand in slots.
 
-    The kernel computes them with the functions ``cos`` and ``sin``, and writes them to ``slots.x``
-    and ``slots.y``. The arguments of the kernel are the slots and the number of columns to fill
-    (:func:`find_positions`).
+    The arguments of the kernel are the slots and the number of slots to fill. It computes the
+    positions with the functions ``cos`` and ``sin``, and writes them into ``slots.x`` and
+    ``slots.y`` (:func:`find_positions`).
     """
 
     @inner
@@ -419,7 +418,8 @@ def find_positions(slots: SlotArrays, count: int, small_angles: bool) -> None:
 
     ``x`` and ``y`` are the positions of shoulder, joints and hand (in length units). Slots beyond
     ``count`` that are computed to fill a vector are filled as well (:func:`padded_count`).
-    ``small_angles`` may be True only if all absolute link angles are below 1e5 rad.
+    ``small_angles`` may be True only if all link angles, measured from +x, are below 1e5 rad in
+    size.
     """
     if small_angles:
         _near_chains(slots, padded_count(count))

@@ -6,7 +6,7 @@ phases (paper, sections *Generating Movement for Each Goal* and *The Corrective 
 1. *begin*: the run's next goal is set.
 2. *aim*: a hand and, usually, a target are chosen. How they are chosen depends on the caller.
 3. *move*: the robot moves to the target. Without a target it only checks whether its hand is in the
-   goal already.
+   goal already; an option leaves out this check.
 4. *correct*: if the goal is missed, the corrective process **A** looks for a configuration that
    hits the goal, and the robot moves to that configuration.
 5. *record*: the results at the goal are recorded. The trial goes on if the goal is hit.
@@ -40,25 +40,25 @@ COUNTED = (
 the columns of the arrays ``counts``."""
 TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
 GoalRecord = Any
-"""Record of the results at one goal of a trial (:func:`goal_record_type`)."""
+"""Record with the results at one goal of a trial (:func:`goal_record_type`)."""
 
 
 @cache
 def goal_record_type(width: int) -> np.dtype[np.void]:
     """Return the NumPy dtype of the record of one goal in a trial.
 
-    Configurations have ``width`` entries. If there are several movements to targets for a goal,
-    there is a record for each of them. The fields ``target`` and ``moved`` are filled in each of
-    these records, all other fields only in the first record.
+    Configurations have ``width`` entries. If several movements are requested for a goal, there is a
+    record for each of them. The fields ``target`` and ``moved`` are filled in each of these
+    records, all other fields only in the first record.
     """
     fields = {
         "q": (np.float64, width),  # where the robot is afterwards, in length units and rad
         "target": (np.float64, width),  # of the movement, without noise; as requested if not made
-        "corrected": (np.float64, width),  # target of the last corrective movement, if one is made
+        "corrected": (np.float64, width),  # last iterate of A, if a corrective movement is made
         "moved": np.int64,  # ticks of the movement to the target, 0 if it is not made
         "hand": np.int64,
         "hit": np.bool_,
-        "ticks": np.int64,  # of all movements
+        "ticks": np.int64,  # of all movements for the goal
         "corrections": np.int64,  # corrective movements made
         "iterations": np.int64,  # of the corrective process
         "evaluations": np.int64,  # of forward kinematics
@@ -74,8 +74,8 @@ def goal_record_type(width: int) -> np.dtype[np.void]:
 def set_off(run: RunRecord, q: Any, seed: Any, draw: Any, robot: RobotRecord) -> None:
     """Start the trial of a run at configuration ``q``, shape ``(dof,)``, in place.
 
-    ``going`` becomes True and ``evaluations`` 0. The trial is made with draw ``draw`` of the motor
-    noise with the 64-bit seed ``seed``. All other fields do not change.
+    ``going`` becomes True, and ``evaluations`` becomes 0. With motor noise, ``world`` becomes the
+    key of draw ``draw`` of the noise with the 64-bit seed ``seed``. All other fields do not change.
     """
     fill_row(run.q, q)
     run.going, run.evaluations = True, 0
@@ -88,8 +88,8 @@ def begin(run: RunRecord, number: int, goal: Any) -> None:
     """Set the next goal of a run, x and y, in place: phase 1, *begin*.
 
     ``number`` is the goal's number in the task, from 0. The target becomes the present
-    configuration, ``hit`` False and ``corrects`` True. The next action is to check whether the hand
-    is in the goal; there is no next action if the trial has ended.
+    configuration, ``hit`` becomes False, and ``corrects`` becomes True. The next action becomes
+    :data:`CHECK`, or :data:`IDLE` if the trial has ended.
     """
     fill_row(run.goal, goal)
     fill_row(run.target, run.q)
@@ -102,8 +102,8 @@ def begin(run: RunRecord, number: int, goal: Any) -> None:
 def aim(run: RunRecord, target: Any) -> None:
     """Set the target of a run, in place: phase 2, *aim*.
 
-    A coordinate whose entry of ``target`` is NaN does not move. Unless all entries are NaN, the
-    next action becomes :data:`MOVE`. The length of ``target`` is at least ``dof``.
+    A coordinate whose entry of ``target`` is NaN does not move. The next action becomes
+    :data:`MOVE`, unless all entries are NaN.
     """
     for j in range(len(target)):
         if not math.isnan(target[j]):
@@ -146,20 +146,22 @@ def count_goal(goal: GoalRecord, counts: Any) -> None:
 
 
 class Requests(NamedTuple):
-    """Requested trials of the kernel: N trials, G goals, and M movements for each goal."""
+    """Requests for N trials with G goals, and M movements for each goal."""
 
     starts: Configs
-    """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` if all trials start alike."""
+    """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` for the same start of all
+    trials."""
     hands: Hands
     """Hand for each goal, 0 left or 1 right, shape ``(N, G)``."""
     targets: Configs
     """Targets, shape ``(N, G, M, dof)``, in length units and rad; NaN for coordinates that do not
-    move. The target of a path is its last waypoint. The first movement for a goal is always made,
-    further movements only while the goal is missed."""
+    move. If all entries of a target are NaN, there is no movement. The target of a path is its last
+    waypoint. The first movement for a goal is always made, further movements only while the goal is
+    missed."""
     movements: NDArray[np.int64]
     """Action and waypoints of each movement, shape ``(N, G, M, 3)``:
 
-    - the action :data:`~coartic.motion.kernels.move.MOVE`, ``REPEAT`` or ``FOLLOW``;
+    - the action ``MOVE``, ``REPEAT`` or ``FOLLOW`` (:data:`coartic.motion.kernels.move.IDLE`);
     - for a path, the start and the end (exclusive) of its range of rows in ``waypoints``.
 
     The array is empty if the action of all movements is ``MOVE``.
@@ -172,12 +174,12 @@ class Requests(NamedTuple):
     first: int
     """Index in the task of the first goal of ``goals``, from 0."""
     worlds: NDArray[np.uint64]
-    """Seed of the noise and number of the noise draw for each trial, shape ``(N, 2)``, or ``(1,
-    2)`` if they are the same for all trials."""
+    """Seed of the noise and number of the noise draw for each trial (:func:`.noise_draws`), shape
+    ``(N, 2)``, or ``(1, 2)`` if they are the same for all trials."""
 
 
 NO_REWARD = -(2**63 - 1)
-"""Reward of a failed trial where rewards are integers."""
+"""Integer that stands for the reward of a failed trial in arrays of rewards."""
 
 
 @inlined
@@ -201,10 +203,10 @@ def _reach_lot(
 ) -> None:
     """Make ``count`` of the requested trials, beginning with trial ``offset``, in place.
 
-    ``arms`` is :class:`Requests`, of which each row is a trial. ``count`` is at most the number of
-    runs of ``batch``, and ``robot`` is a :data:`RobotRecord`. This function fills the records
-    ``goals``, shape ``(N, G, M)``, and adds to ``counts``, shape ``(N, 5)``, which the caller has
-    set to 0.
+    ``arms`` is :class:`Requests`; each row of its arrays belongs to a trial. ``count`` is at most
+    the number of runs of ``batch``, and ``robot`` is a :data:`RobotRecord`. This function fills the
+    records ``goals``, shape ``(N, G, M)``, and adds to ``counts``, shape ``(N, 5)``. The caller has
+    set ``counts`` to 0.
     """
     for i in range(count):
         n, run = offset + i, batch.runs[i]
@@ -254,11 +256,12 @@ REQUESTED = len(Requests._fields)
 
 @entry
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *arrays: Any) -> None:
-    """Make the requested trials, a batch of trials at a time.
+    """Make the requested trials, as many at a time as the batch has runs.
 
     ``goals``, ``counts`` and ``rewards`` are the entries of
-    :class:`~coartic.motion.trials.TrialRecords`, filled in place; the caller sets ``counts`` to 0.
-    ``arrays`` are the entries of :class:`Requests`, followed by the entries of a batch.
+    :class:`~coartic.motion.trials.TrialRecords`. They are filled in place; the caller has set
+    ``counts`` to 0. ``arrays`` are the entries of :class:`Requests`, followed by the entries of a
+    batch.
     """
     arms, batch = Requests(*arrays[:REQUESTED]), Batch(*arrays[REQUESTED:])
     count, room = len(arms.targets), len(batch.runs)

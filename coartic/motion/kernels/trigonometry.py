@@ -35,11 +35,10 @@ _C4, _C6, _C8, _C10, _C12, _C14, _C16 = ((-1) ** n / math.factorial(2 * n) for n
 
 @scalar
 def _reduced(angle: float) -> tuple[float, float, int]:
-    """Reduce an angle, and return sine and cosine of the remainder.
+    """Divide an angle into quarter turns and a remainder from -π/4 to π/4.
 
-    The angle (in rad, |angle| < 1e5) is the sum of an integer number of quarter turns and a
-    remainder from -π/4 to π/4. Return the sine and the cosine of the remainder, and the number of
-    quarter turns modulo 4.
+    The angle is in rad, |angle| < 1e5. Return the sine of the remainder, the cosine of the
+    remainder, and the number of quarter turns modulo 4.
     """
     quarters = np.rint(angle * _PER_QUARTER)
     x = ((angle - quarters * _HIGH) - quarters * _MIDDLE) - quarters * _LOW
