@@ -392,10 +392,10 @@ def judge_control(values):
 
 
 LABELS = {
-    "learner-gains": "learner gains more than random search (%)",
-    "cma-es-ahead": "CMA-ES ahead of the learner (%)",
-    "policy-gradient-ahead": "policy gradient ahead of the learner (%)",
-    "first-movement-slower": "first movement slower than in random search (%)",
+    "learner-gains": "learner saves more ticks than random search (%)",
+    "cma-es-ahead": "CMA-ES takes fewer ticks than the learner (%)",
+    "policy-gradient-ahead": "policy gradient takes fewer ticks than the learner (%)",
+    "first-movement-slower": "learner's first movement slower than random search's (%)",
     "learner-leans": "learner leans more than random search (points of lean)",
     "joints-lean": "learner's joints lean (points of lean)",
 }
@@ -441,7 +441,7 @@ def draw(table):
     handles = [
         legend_line(family, color=figures.PALETTE[number]) for number, family in enumerate(FAMILIES)
     ]
-    handles.append(legend_line("reversed", color=figures.GREY, markerfacecolor="white"))
+    handles.append(legend_line("opposite holds", color=figures.GREY, markerfacecolor="white"))
     figures.legend(figure, handles, 4)
     return figure
 
