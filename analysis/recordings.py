@@ -115,7 +115,7 @@ def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
     -----
     UserWarning
         - At least one hit of a subject is more than two radii from the centre of its goal.
-        - The median ``pace`` of a subject (:func:`consistency`) is below 0.1, above 10, or NaN.
+        - The median ``pace`` of a subject (:func:`consistency`) is below 0.1 or above 10.
     """
     return _judged(_readable(frame, task, "the frame"), task, "the frame")
 
@@ -388,7 +388,7 @@ def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
 
     - Warns if a hit of a subject is more than two radii from the centre of its goal. Raises
       CoarticError if this is so for more than half of the hits of a subject.
-    - Warns if the median ``pace`` of a subject is below 0.1, above 10, or NaN.
+    - Warns if the median ``pace`` of a subject is below 0.1 or above 10.
 
     ``source`` is the name of the hits in these messages.
     """
@@ -403,7 +403,7 @@ def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
             )
         if far.any():
             warnings.warn(words, stacklevel=_OF_CALLER)
-        if not 0.1 <= pace <= 10:
+        if pace < 0.1 or pace > 10:
             warnings.warn(
                 f"{source}: the median movement of {subject} takes {pace:.2g} times as long as the "
                 "model's; ticks_per_unit sets the unit of a column duration",

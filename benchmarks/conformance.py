@@ -338,7 +338,9 @@ def check_task_file(path: Path, registered: Registry) -> list[CheckResult]:
     return [
         CheckResult("valid", True, f"{task.name}, {count}"),
         CheckResult(
-            "distinct goals", not near, near[0] if near else "successive goals do not overlap"
+            "distinct goals",
+            not near,
+            near[0] if near else "successive goals are more than one radius apart",
         ),
         CheckResult("solvable", is_solved, finding),
     ]
