@@ -1,5 +1,7 @@
 """Recordings: the same hits from any source, what is refused, what the two numbers show."""
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -159,6 +161,13 @@ def test_off_and_pace_are_those_of_the_robot(people):
         else:
             assert got.pace == pytest.approx(hit.ticks / max(way / 0.01, 1))
     assert fit.off.max() <= 1 + 1e-6  # learned movements end where they hit
+
+
+def test_nobody_is_warned_of_a_pace_that_is_not_known(people):
+    """The pace needs the hit before, or the start of the task."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(check_hits(people[people.goal == 2], BOTH)) == 10
 
 
 # ----------------------------------------------------------------------------------- solutions
