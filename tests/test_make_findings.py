@@ -150,7 +150,7 @@ def test_leans_of_the_readme_are_what_the_tables_say():
     assert [name.split(",")[0] for name, _ in rows] == [*ids]
     assert [int(lean) for _, lean in rows] == [*(100 * leans.lean_base).round()]
     ends = [round(100 * end) for end in (leans.lean_joints.min(), leans.lean_joints.max())]
-    assert f"their lean is between {ends[0]} % and {ends[1]} %" in re.sub(r"\s+", " ", text)
+    assert f"is between {ends[0]} % and {ends[1]} %" in re.sub(r"\s+", " ", text)
 
 
 def test_the_first_table_of_the_readme_is_what_the_tables_say():
