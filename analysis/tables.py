@@ -894,12 +894,13 @@ def gaps_of_settings(study: Study, labels: Sequence[str]) -> pd.Series:
 def list_parameters(study: Study) -> Rows:
     """Yield a row for each value of each varied parameter whose values can be compared.
 
-    :func:`values_of_parameters` says which values can be compared. Columns:
+    :func:`values_of_parameters` says which values can be compared. A parameter is left out if, for
+    one of its values, the compared settings have no run number in common on some task. Columns:
 
     - ``gap``: mean gap over the compared settings with this value and over tasks, a fraction, with
       its interval for other runs on the same tasks;
-    - ``at_best``: gap of the setting that has this value, and in all other parameters the values of
-      the best setting. It is NaN if this setting is not compared;
+    - ``at_best``: gap of the setting that has this value, and differs from the setting with the
+      smallest gap in this parameter at most. It is NaN if this setting is not compared;
     - ``difference`` and ``p_holm``: difference from the value with the smallest gap, and its
       p-value (:func:`.stratified_test`), Holm-adjusted over the values of the parameter. Both are
       NaN for the value with the smallest gap itself;
@@ -915,7 +916,7 @@ def list_parameters(study: Study) -> Rows:
             by_task = [gaps[task].to_numpy(np.float64) for task in tasks if task in gaps]
             is_random = any(methods.stochastic[value.labels])
             samples.append(by_task if is_random else [float(of.mean()) for of in by_task])
-        if not values or len(samples[0]) < len(tasks):  # no run that all settings have
+        if not values or min(map(len, samples)) < len(tasks):  # no run that all settings have
             continue
         estimates = [*map(_mean_of_gaps, samples)]
         best = int(np.argmin([estimate.value for estimate in estimates]))

@@ -800,14 +800,25 @@ def _wrapped_trial(
     return float(inner.outcome)
 
 
+def _every_layer(env: Any) -> Iterator[Any]:
+    """Yield the layers of an environment, and those of each member of a vector environment."""
+    yield env
+    if inner := next((getattr(env, name) for name in ("venv", "env") if hasattr(env, name)), None):
+        yield from _every_layer(inner)
+    elif hasattr(env, "envs"):
+        for member in env.envs:
+            yield from _every_layer(member)
+
+
 @contextmanager
 def _not_learning(env: Any) -> Iterator[None]:
     """Keep the statistics of normalising wrappers unchanged in a ``with`` block."""
     learning = [
         (layer, name, getattr(layer, name))
-        for layer in _layers(env)
+        for layer in _every_layer(env)
         for name in ("training", "update_running_mean")
-        if name in {*vars(layer), *vars(type(layer))}
+        # A wrapper has the attributes of the layers inside it, too.
+        if name in vars(layer) or hasattr(type(layer), name)
     ]
     try:
         for layer, name, _ in learning:

@@ -272,6 +272,20 @@ def test_an_environment_in_wrappers_is_taken_as_it_is():
     assert (learns.obs_rms.count, learns.update_running_mean) == (count, True)
 
 
+def test_scoring_changes_no_statistics_of_any_member():
+    """Also of a subclass of the wrapper, and of the members after the first."""
+
+    class Normal(wrappers.NormalizeObservation):
+        pass
+
+    made = [Normal(gymnasium.make(TWO)) for _ in range(2)]
+    vector = gymnasium.vector.SyncVectorEnv([lambda each=each: each for each in made])
+    counts = [each.obs_rms.count for each in made]
+    score(vector, lambda seen: np.zeros((len(seen), 10), np.float32))
+    assert [each.obs_rms.count for each in made] == counts
+    assert all(each.update_running_mean for each in made)
+
+
 class Still(TaskEnv):
     """Whatever the action, does what zeros do."""
 

@@ -22,7 +22,7 @@ from coartic.analysis.statistics import holm, stratified_test
 from coartic.analysis.study import Study
 from coartic.analysis.tables import shown_columns
 from coartic.analysis.words import number
-from tests.support.made_up import MadeUp, made_up_optima, runs_of, study_of
+from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of
 from tests.support.made_up import study_of_rewards as study
 
 EC1, BOTH = "dual-process/EC1", "dual-process (EC1, EC4)"
@@ -468,6 +468,21 @@ def test_values_are_compared_at_equal_values_of_the_other_parameters():
     apart = study_of([*rows[5:]], optima=made_up_optima("ascending"))
     assert not len(TABLES["parameters"](apart))
     assert all("not compared" in line for line in said(apart)[1:3])
+
+
+def test_a_parameter_is_left_out_if_the_settings_of_a_value_share_no_run():
+    """As in a folder that was interrupted; the other parameter is compared."""
+    rows = []
+    for noise, epsilon in itertools.product(NOISE[:2], EPSILON):
+        parameters = {"noise_sd": noise, "epsilon": epsilon}
+        numbers = (0, 1) if epsilon == EPSILON[0] else (2, 3)
+        rows += [
+            row(EC1, -300 - run, task="ascending", run=run,
+                setting=f"noise_sd={noise}, epsilon={epsilon}", parameters=json.dumps(parameters))
+            for run in (numbers if noise == NOISE[0] else range(4))
+        ]  # fmt: skip
+    seen = study_of(rows, optima=made_up_optima("ascending"))
+    assert {*by_value(seen).index.get_level_values("parameter")} == {"epsilon"}
 
 
 def test_intervals_and_tests_of_values_resample_runs_with_all_their_settings():
