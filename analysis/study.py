@@ -152,7 +152,7 @@ def load(folder: str | Path, *, against: str = "") -> Study:
 
 
 def _label_in(study: Study, name: str) -> str:
-    """Return the label of the method to which a user's name refers.
+    """Return the label of the method that ``name``, as a user may write it, refers to.
 
     The name is looked up first among the labels of the study's methods, then among their ids, and
     then among their titles. For the learner, ``dual-process/`` at the beginning of an id or a label

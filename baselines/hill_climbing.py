@@ -130,9 +130,10 @@ class HillClimbing(Method):
                     return hand_sequence
 
         def adapt(hand_sequence: str, is_good: bool) -> None:
-            """Count a trial with a hand sequence, and adapt its spread by the one-fifth rule.
+            """Count a trial with a hand sequence, and adapt the sequence's spread.
 
-            ``is_good`` is True if the reward of the trial is at least the value of its centre.
+            The spread follows the one-fifth rule. ``is_good`` is True if the reward of the trial is
+            at least the value of the centre around which it was drawn.
             """
             since[hand_sequence] += 1
             good[hand_sequence] += is_good

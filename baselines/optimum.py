@@ -409,11 +409,11 @@ def mean_ticks_in(session: Session, task: Task, start: _Start, worst: int, seed:
 def minima(
     mean_ticks: MeanTicks, start: Array, evaluations: int, executions: int
 ) -> Iterator[Array]:
-    """Minimise mean ticks by CMA-ES with restarts, and yield two points of each restart.
+    """Minimise mean ticks by CMA-ES with restarts, and yield two points of each start.
 
-    The two points are the last mean of CMA-ES, and the best point: the point with the fewest mean
-    ticks in all generations of this restart. The next restart begins at the best point, with twice
-    the population size.
+    For the first start and each restart, the function yields the final centre of the search
+    distribution, and then the best point: the point with the fewest mean ticks in all generations
+    since this start. The next restart begins at the best point, with twice the population size.
 
     Parameters
     ----------

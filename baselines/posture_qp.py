@@ -118,7 +118,7 @@ class PostureController(Controller):
         aims : tuple of Aim
             Hand and goal: the current goal, then the goals ahead.
         memory : dict or None
-            Dict that maps each aim of the movement before to its posture, shape ``(dof,)``; None
+            Dict that maps each aim of the previous movement to its posture, shape ``(dof,)``; None
             for the first movement.
 
         Returns

@@ -1,4 +1,4 @@
-"""Worker processes, which round numbers alike and do not search the current folder for modules."""
+"""Worker processes, which round numbers alike and do not import the main program."""
 
 from __future__ import annotations
 
@@ -30,8 +30,9 @@ _starting = threading.Lock()
 class WorkerProcess(_BASE.Process):  # type: ignore[misc]
     """Process that starts with the environment variables of a worker.
 
-    NumPy reads these variables when it is imported (:func:`.worker_variables`). The process imports
-    neither the main program nor any module from the current folder.
+    NumPy reads these variables when it is imported (:func:`.worker_variables`). The process does
+    not import the main program. It searches for modules in the folders of the parent's
+    ``sys.path``, and not in the current folder in addition.
     """
 
     @staticmethod

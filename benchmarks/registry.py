@@ -87,8 +87,8 @@ def check_id(name: str, origin: str, registered: Registry) -> None:
     CoarticError
         One of these is the case:
 
-        - the id does not begin with a letter or digit, has a character other than a letter, a digit
-          or one of ``._+/-``, or has more than 80 characters;
+        - the id does not begin with an ASCII letter or digit, has a character other than an ASCII
+          letter, a digit or one of ``._+/-``, or has more than 80 characters;
         - the id begins with ``dual-process/`` or ``optimum/``;
         - the id is a known id, the id of an exploration condition or one of :data:`NAMES`, where
           upper and lower case are treated as equal.
@@ -96,7 +96,8 @@ def check_id(name: str, origin: str, registered: Registry) -> None:
     if not METHOD_NAME.fullmatch(name):
         raise CoarticError(
             f"{origin}: method id {name!r} must begin with a letter or digit and have at most 80 "
-            "characters, only letters, digits, '.', '_', '+', '/' and '-', such as 'my-search'"
+            "characters: letters from a to z, digits, '.', '_', '+', '/' and '-', such as "
+            "'my-search'"
         )
     problem = ""
     if name.startswith(_RESERVED):

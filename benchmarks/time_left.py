@@ -114,10 +114,11 @@ class TimeLeft:
         return max(left_s / at_once - since_s, since_s / 4)
 
     def _factor(self, method: str) -> float:
-        """Return the weighted time of finished runs, divided by the weighted :func:`_shipped_s`.
+        """Return the time of finished runs, divided by their expected time (:func:`_shipped_s`).
 
-        The finished runs are those of the method's group (:func:`_group_of`). The factor is NaN
-        before the first run of the group has finished.
+        Both times are sums over runs, in which later runs have more weight. The finished runs are
+        those of the method's group (:func:`_group_of`). The factor is NaN before the first run of
+        the group has finished.
         """
         usual_s = self._usual_s[_group_of(method)]
         return self._took_s[_group_of(method)] / usual_s if usual_s else math.nan

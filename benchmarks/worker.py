@@ -81,7 +81,8 @@ def fail(
 def answer_of(outcomes: Sequence[Outcome]) -> bytes:
     """Encode outcomes as JSON: a list of objects with the fields of :class:`Outcome`.
 
-    NaN and infinity are written as ``NaN`` and ``Infinity``, which Python's module ``json`` reads.
+    In movements, a NaN of a target is written as ``null`` (:func:`.movement_data`). Elsewhere NaN
+    and infinity are written as ``NaN`` and ``Infinity``, which Python's module ``json`` reads.
     Raises TypeError, ValueError or RecursionError for data that JSON cannot represent.
     """
 

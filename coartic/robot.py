@@ -360,7 +360,7 @@ class Robot:
         Raises
         ------
         ValueError
-            ``q`` has another size, or the hand is unknown.
+            ``q`` does not have ``dof`` entries, or the hand is unknown.
         """
         import casadi
 

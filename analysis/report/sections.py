@@ -512,7 +512,10 @@ def limits(study: Study) -> dict[str, Any]:
 
 
 def failed_methods(study: Study) -> list[str]:
-    """Return a sentence for each method that is not ranked and has failed runs."""
+    """Return a sentence for each row of :func:`.standings` that is not ranked and has failed runs.
+
+    Searches for the optimum, and runs on tasks without a best known reward, are not considered.
+    """
     rows = standings(study).query("why != '' and failed > 0")
     where = f" in {world_title(study.world)}" if study.world else ""
     return [

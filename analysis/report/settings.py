@@ -46,8 +46,8 @@ def answer_on_parameters(study: Study) -> list[str]:
           parameters of which another value is better on average.
         - For each parameter, a line on how much its values change the gap
           (:func:`.list_parameters`).
-        - If there are settings that are worse than the corrective process alone, a line with their
-          number.
+        - If there are settings that are worse than the corrective process alone with its best
+          hands, a line with their number.
 
         The list is empty if no setting is ranked.
     """
@@ -138,10 +138,11 @@ def _effect_of(study: Study, parameter: str) -> str:
 
 
 def _settings_behind(study: Study, rows: pd.DataFrame) -> str:
-    """Return a sentence on the ranked settings that are worse than the corrective process alone.
+    """Return a sentence on the ranked settings that are worse than the corrective process.
 
-    ``rows`` are the ranked settings. A setting is worse if its mean share of the possible gain is
-    below 0. The result is the empty string if there is no such setting.
+    ``rows`` are the ranked settings. The corrective process acts alone, with its best hands. A
+    setting is worse if its mean share of the possible gain is below 0. The result is the empty
+    string if there is no such setting.
     """
     behind = rows[rows.share < 0]
     if not len(behind):

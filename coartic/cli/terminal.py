@@ -141,8 +141,9 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 class Display:
     """Context manager that shows on standard error what a command is doing.
 
-    On a terminal, one line is shown and updated. Elsewhere, for example in a file, a line is
-    printed at most every ten seconds, and once more at the end of the runs.
+    On a terminal, except one with ``TERM=dumb``, one line is shown and updated. Elsewhere, for
+    example in a file, progress is printed at most every ten seconds, and once more at the end of
+    the runs. Other messages (:meth:`line`) are printed at once.
     """
 
     EVERY_S = 10.0

@@ -171,7 +171,7 @@ def follow(
         - the hand is unknown;
         - a constant of the model is out of bounds, or the model has motor noise.
     TypeError
-        ``robot``, ``waypoints`` or ``model`` has a wrong type.
+        ``robot`` or ``model`` has a wrong type, or ``waypoints`` has no length.
     """
     batch = one_run(robot, q, hand, goal, radius)
     points = finite_array("waypoints", waypoints, (max(len(waypoints), 1), robot.dof))

@@ -148,7 +148,7 @@ class Job:
         return run_seed(self.seed, self.cell.task.name, number)
 
     def judge_seed(self, number: int) -> int:
-        """Return the seed of the noise for scoring run ``number`` (:func:`judge_seed`)."""
+        """Return the seed of the noise with which run ``number`` is scored (:func:`judge_seed`)."""
         return judge_seed(self.seed, self.cell.task.name, number)
 
 
@@ -216,7 +216,7 @@ def run_seed(suite_seed: int, task: str, number: int) -> int:
 
 
 def judge_seed(suite_seed: int, task: str, number: int) -> int:
-    """Return the seed of the noise for scoring run ``number`` of a task.
+    """Return the seed of the noise with which run ``number`` of a task is scored.
 
     The seed is computed from the suite's seed, the task's name and the run's number. It is the same
     for all methods, and no method sees noise with this seed in its own trials.

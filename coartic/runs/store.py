@@ -360,7 +360,11 @@ class Store:
                 )
 
     def check_file(self) -> None:
-        """Raise CoarticError if pages of the file, or JSON in table ``results``, are damaged."""
+        """Raise CoarticError if SQLite finds the structure of the file damaged.
+
+        It is also raised if details or movements of a result are not valid JSON. Changed values
+        that are still valid are not found.
+        """
         broken = "SELECT 1 FROM results WHERE NOT (json_valid(details) AND json_valid(movements))"
         if self._rows("PRAGMA quick_check(1)") != [("ok",)] or self._rows(f"{broken} LIMIT 1"):
             raise CoarticError(f"{plain(str(self.folder / RUNS_FILE))} cannot be used: {_DAMAGED}")

@@ -139,9 +139,9 @@ class Start(FileData):
 class Task(FileData):
     """A sequence of goals to hit in order, each with one hand of the robot.
 
-    :func:`load_task` reads a task from a file, or finds it by its name. Fields of a task cannot be
-    changed. In Python a configuration ``q0=``, shape ``(dof,)``, can be passed instead of
-    ``start``: ``Task(goals=[(3, 2), (4.5, 2)], q0=np.zeros(10))``.
+    :func:`load_task` reads a task from a file, or finds it by its name. New values cannot be
+    assigned to the fields of a task. In Python a configuration ``q0=``, shape ``(dof,)``, can be
+    passed instead of ``start``: ``Task(goals=[(3, 2), (4.5, 2)], q0=np.zeros(10))``.
 
     Source of the shipped tasks: paper, section *Experiments*. ``provenance`` contains the sources
     of the numbers.
@@ -210,7 +210,10 @@ class Task(FileData):
 
     @property
     def family(self) -> str | None:
-        """Name of the family with its version, from the name of an instance; otherwise None."""
+        """Family with its version, such as ``two-armed/v1``, if the task is named as an instance.
+
+        Otherwise it is None.
+        """
         address = address_of(self.name)
         return address and address.family
 

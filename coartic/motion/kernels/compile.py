@@ -427,10 +427,10 @@ class _MachineCode:
     def wait_for_lock(self) -> bool:
         """Lock this function's code for this process, and return whether that succeeded.
 
-        The ids of the process and of its command are written into the lock file, unless the disk is
-        full. Locking fails if the file cannot be locked, or if another process holds the lock for
-        more than 120 s. After 60 s a logged message names that process, unless it belongs to the
-        same command.
+        The id of the process, and that of the main process of its command, are written into the
+        lock file, unless the disk is full. Locking fails if the file cannot be locked, or if
+        another process holds the lock for more than 120 s. After 60 s a logged message names that
+        process, unless it belongs to the same command.
         """
         with contextlib.suppress(OSError):
             file = open(f"{self.cache_path}/{self.name}.lock", "a+b", buffering=0)  # noqa: SIM115

@@ -286,7 +286,7 @@ def load(slots: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) ->
 def squared_distance(run: RunRecord) -> float:
     """Return the squared Euclidean distance from a run's configuration to its target.
 
-    The distance does not depend on the norm and the weight of the base of the motion model.
+    The distance depends neither on the motion model's ``norm`` nor on its ``base_weight``.
     """
     square = 0.0
     for j in range(len(run.q)):
