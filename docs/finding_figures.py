@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from coartic.analysis import mean
 from coartic.analysis.figures import dots, look_of, panels, style, styled
+from coartic.analysis.methods import BY_FORMULA, BY_TRIAL, COLORS, KINDS
 
 Table = Callable[..., pd.DataFrame]
 """Function that returns a stored table. Its arguments are the name of a suite or a study, the name
@@ -35,7 +36,7 @@ whose look it has."""
 INFORMED = "dual-process (EC1-informed, EC4-informed)"
 NOISE = "motor_noise=0.01"
 """The world of the second ranking, as it stands in the names of stored tables."""
-FORMULA, REWARDS = style.GREEN, style.BLUE
+FORMULA, REWARDS = (COLORS[KINDS[kind][0]] for kind in (BY_FORMULA, BY_TRIAL))
 """Colours of methods that use the reward as a formula, and of methods that use the reward of each
 trial."""
 RANKED = {
