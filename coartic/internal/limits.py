@@ -87,8 +87,8 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
 
     ``value`` is a number, an array, or a list of numbers or of lists. An ``ndarray`` of float64 is
     returned without a copy. NaN and infinity are allowed. Raises ValueError for strings, complex
-    numbers, True and False, rows of unequal length, masked entries, integers that are too large for
-    float64, and any other objects that are not real numbers.
+    numbers, True and False, rows of unequal length, masked entries of NumPy, integers that are too
+    large for float64, and any other objects that are not real numbers.
     """
     import numpy as np  # slow to import, and the help of commands does not need it
 
