@@ -287,7 +287,7 @@ def tasks_of(block: _Block, own: Collection[str], task_named: TaskNamed) -> Iter
     ----------
     block : _Block
     own : collection of str
-        Names of the user's tasks, which belong to a block with the entry ``*`` in ``tasks``.
+        Names of further tasks, which belong to a block with the entry ``*`` in ``tasks``.
     task_named : callable
         Function that returns the task with a given name or file.
 

@@ -170,8 +170,8 @@ def resolve_methods(
     Returns
     -------
     list of str
-        Ids in the order of ``names``. The ids that match a wildcard are in the order of
-        ``registered``.
+        Ids, and wildcards that are not replaced, in the order of ``names``. The ids that match a
+        wildcard are in the order of ``registered``.
 
     Raises
     ------

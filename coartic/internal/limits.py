@@ -1,4 +1,4 @@
-"""Largest sizes of plans, and checks of numbers that users pass."""
+"""Largest values of numbers that users pass, and checks of such numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MAX_CELLS = 10_000
-"""Largest number of cells of a suite."""
+"""Largest number of instances that a range of instances names, and of episodes of a score."""
 MAX_RUNS = 1_000_000
 """Largest number of runs of a cell."""
 MAX_TRIALS = 10_000_000

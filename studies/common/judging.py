@@ -4,8 +4,8 @@ A claim says that a mean over tasks lies beyond a bound (:func:`mean_beyond`), o
 several means does (:func:`all_of`). :func:`judge` adjusts the p-values of all claims of a study
 together, by Holm's method. Two rules make verdicts stricter:
 
-- Each test is made a second time without the task that favours the claim most. A claim is supported
-  only if it is significant both times.
+- Each test is made a second time without the task that favours the claim most. A claim with tests
+  is supported only if they are significant both times.
 - If the values over tasks are very skewed, the level of significance is 1 % instead of 5 %
   (:func:`level_of`).
 """
