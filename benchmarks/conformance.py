@@ -51,7 +51,8 @@ class CheckResult(NamedTuple):
     passed: bool | None
     """True if the check found no problem, False if it found one, None if it was not made."""
     finding: str
-    """The first problem, or a sentence on what was checked."""
+    """The first problem. If there is none, a text on what was checked, such as the title of the
+    method; if the check was not made, the reason."""
 
 
 def check_method(
@@ -80,7 +81,8 @@ def check_method(
     Raises
     ------
     CoarticError
-        Worker processes cannot start, or the file of the method was changed after it was read.
+        Worker processes cannot start, the file of the method was changed after it was read, or the
+        method cannot say whether it applies to a task.
     """
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
@@ -279,7 +281,7 @@ CHECKS: dict[
 }
 """Dict that maps the name of each check to two functions. Both are called with the declaration of
 the method and its runs. The first function yields a sentence for each problem of the method. The
-second function returns a sentence on what was checked; it is called if there is no problem."""
+second function returns a text on what was checked; it is called if there is no problem."""
 
 
 def _hopeless_task(like: Task) -> Task:

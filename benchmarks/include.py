@@ -61,8 +61,8 @@ def include_folders(
         default, cells on all tasks are joined.
     methods : mapping of str to MethodInfo, optional
         Dict that maps ids to the methods that the command knows; by default the methods of
-        ``plan``. Runs of a method from a file are used only if the code that made them is the code
-        of the method in this dict.
+        ``plan``. If a method in this dict is from a file, its runs in other folders are used only
+        if the same code made them.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def include_folders(
     Raises
     ------
     CoarticError
-        Nothing is copied, because
+        One of these is the case:
 
         - a folder does not exist or cannot be read, or is ``out`` itself;
         - ``out`` cannot be written, or has results of another suite;
@@ -85,8 +85,8 @@ def include_folders(
     UserWarning
         One of these is the case:
 
-        - the joined plan lacks runs of the plan of a folder, because they are not stored in any
-          folder;
+        - the joined plan lacks runs of the plan of a folder, because these runs, or earlier runs of
+          the same cell, are stored in none of the folders;
         - the plan of a folder contains a cell of a stochastic method that ``plan`` lacks, and the
           joined plan has fewer runs of this cell than the largest number of runs that ``plan`` asks
           for;

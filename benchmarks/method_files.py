@@ -47,8 +47,8 @@ _ANSWER_S = 300.0  # longest wait for an answer: libraries can take long to impo
 def read_file(path: Path) -> list[MethodInfo]:
     """Return the declarations of the methods of a file.
 
-    A new process imports the file. This process stays alive, and answers later questions about the
-    methods (:data:`.READERS`).
+    A new process imports the file. The new process stays alive, and answers later questions about
+    the methods (:data:`.READERS`).
 
     Parameters
     ----------
@@ -63,8 +63,9 @@ def read_file(path: Path) -> list[MethodInfo]:
     Raises
     ------
     CoarticError
-        The file cannot be read or imported, defines no method, or has a wrong declaration; or the
-        process cannot start, ends, or does not answer within 300 s.
+        The file cannot be read or imported, defines no method, or has a wrong declaration of a kind
+        that :func:`_declarations` finds; or the process cannot start, ends, or does not answer
+        within 300 s.
     """
     shown = plain(str(path), MAX_LINE_LENGTH)
     read_bytes(path)
@@ -132,8 +133,8 @@ def _answer(path: Path, method: str, question: str, *arguments: Any) -> Any:
 def check_code(info: MethodInfo) -> None:
     """Import the file of a method, and check that its code has not changed.
 
-    Raises CoarticError if the hash of the code (:func:`_code_of`) differs from ``info.code``,
-    because the file, or a file that it reads or imports, was changed after ``info`` was made.
+    Raises CoarticError if the hash of the code differs from ``info.code``, because one of the files
+    in the hash (:func:`_code_of`) was changed after ``info`` was made.
     """
     path = Path(info.where)
     module, loaded = load_file(path, info.code)
@@ -166,9 +167,10 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
     Raises
     ------
     CoarticError
-        The file cannot be imported or defines no complete method; or a method has an attribute of
-        the wrong type, a function with the wrong arguments, or a function ``why_not`` (the old name
-        of ``inapplicable_reason``).
+        The file cannot be imported or defines no complete method; one of the attributes ``name``,
+        ``title``, ``citation``, ``tuned_on``, ``information``, ``adapts_to`` and ``facts`` of a
+        method has a wrong type; its function ``solve`` (or ``optimise``) has wrong arguments; or
+        the method has a function ``why_not`` (the old name of ``inapplicable_reason``).
     """
     try:
         module, loaded = load_file(path)

@@ -1,4 +1,4 @@
-"""Code that runs once, in the fork server from which worker processes are forked.
+"""Code that runs in the fork server, from which worker processes are forked.
 
 This module imports Numba, so that workers need not import it themselves. It also connects standard
 error to the null device, so that a worker that starts while its parent ends does not print a

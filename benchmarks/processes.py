@@ -1,4 +1,4 @@
-"""Worker processes, which round numbers alike and do not import the main program."""
+"""Processes that round numbers alike, with and without the main program of their parent."""
 
 from __future__ import annotations
 

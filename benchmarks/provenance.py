@@ -48,7 +48,7 @@ def current_environment() -> dict[str, Any]:
         - ``packages``: dict that maps libraries (numpy, scipy, ...) to their versions;
         - ``model_code``: hash of the files of the model (:data:`MODEL_FILES`);
         - ``commit``: dict with the id of the commit of the checkout (``id``), and whether tracked
-          files were changed since (``dirty``); None for an installed package;
+          files were changed since (``dirty``); None for an installed package, or if Git fails;
         - ``platform``, ``processor``: names of the operating system and of the processor;
         - ``cores``: number of cores that this process may use;
         - ``arithmetic``: fingerprint of how libraries round (:func:`arithmetic`);

@@ -151,7 +151,7 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
     A run of the folder's plan can be performed here if ``registered`` contains its method with the
     same version or code. If n runs can be performed, k is n divided by ``count``, rounded down, but
     at least 1. Every k-th run is selected, beginning with the first one, until there are ``count``
-    runs.
+    runs. The runs are in no defined order.
 
     Parameters
     ----------
@@ -206,8 +206,8 @@ def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int,
     Returns
     -------
     int
-        Number of solutions that were passed to :func:`.with_noise`, which executes nothing in a
-        world without motor noise that is not the paper's.
+        Number of solutions that were passed to :func:`.with_noise`. That function executes them
+        only in the paper's world and in worlds with motor noise.
     list of str
         A sentence for each number that differs from the stored one.
 
@@ -252,7 +252,8 @@ def compare_runs(a: Row, b: Row) -> list[str]:
     Returns
     -------
     list of str
-        A phrase for each difference. The list is empty if the results are equal.
+        A phrase for each result that differs; for the rewards it describes the first difference.
+        The list is empty if the results are equal.
     """
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()

@@ -66,14 +66,15 @@ class Progress:
     marks: dict[str, list[str]] = field(default_factory=dict)
     """Dict that maps methods to warnings about their runs in the folder (:meth:`Store.marks`)."""
     others: int = 0
-    """Number of runs in the folder that the plan does not ask for, without :attr:`outdated`."""
+    """Number of runs in the folder outside its stored plan (:meth:`.Store.others`), without
+    :attr:`outdated`."""
     wall_s: float = 0.0
     """Wall time of the call, in s; 0 until the call ends."""
     time_left: TimeLeft = field(default_factory=TimeLeft)
     """Estimate of the wall time until all runs are performed."""
     repeats: int = 0
-    """Number of runs that are still to be repeated (:func:`perform`): for each method from a file,
-    one run is performed a second time, to check that it gives the same result."""
+    """Number of runs that are still to be repeated (:func:`perform`); 0 until all missing runs are
+    performed."""
 
     def count(self, status: str) -> None:
         """Count a run of the plan in :attr:`failed` and :attr:`crashed` by its status."""
@@ -185,14 +186,14 @@ def perform(
     - *Failures.* Runs that fail are stored and counted; no error is raised. The next call performs
       two kinds of runs again, if the code of their method is available: runs that crashed, and runs
       that timed out under a limit of CPU time below the limit in the new plan.
-    - *Interruption.* Runs that finished before an interruption are stored.
+    - *Interruption.* The runs of jobs that finished before an interruption are stored.
     - *Motor noise.* If the stored mean ticks of a run follow another version of the rule of noise,
       they are computed again.
     - *Repetition.* A method from a file could keep state from one run to the next. So for each such
-      method, one run of this call is performed a second time, in another process. If the results
-      differ, this call warns, and reports mark the method. The repeated run is the quickest run
-      with status ``ok`` that was not the first run of its process; if there is none, it is the
-      quickest run with status ``ok``.
+      method, one run of this call that has status ``ok`` is performed a second time, in another
+      process. If the results differ, this call warns, and reports mark the method. The repeated run
+      is the quickest of these runs that was not the first run of its process; if there is none, it
+      is the quickest of all.
 
     Parameters
     ----------

@@ -91,8 +91,8 @@ def with_noise(runs: Sequence[Row]) -> list[Row]:
       number before the hyphen in the id of the run.
     - In a world with motor noise, ``mean_ticks`` is the mean number of ticks over the executions in
       this world, and ``failed_executions`` is the number of failed executions. A failed execution
-      counts as twice the ticks of the corrective process with its best hands (if that process
-      completes the task with no hands, ``mean_ticks`` is None). The seed of the noise is
+      counts as twice the ticks of the corrective process with its best hands; if that process does
+      not complete the task with any hands, ``mean_ticks`` is None instead. The seed of the noise is
       :func:`.judge_seed`, the same for all methods.
     - In any other world nothing is executed, and the runs are returned unchanged.
 

@@ -60,7 +60,7 @@ _Number = Annotated[int, Field(ge=1, strict=True)]
 def _worlds(value: Any) -> tuple[MotionModel, ...]:
     """Validate a table ``model``, and return the worlds that it describes.
 
-    The table maps each constant (:data:`.WORLD`) to a value or to a list of values. The result
+    The table maps constants (:data:`.WORLD`) to a value or to a list of values. The result
     contains a world for each combination of the values. A tuple of worlds is returned unchanged.
     Raises a validation error for an unknown constant, a wrong value or an empty table.
     """
@@ -105,7 +105,7 @@ class _Block(FileData):
 
     tasks: _Names
     """Names of tasks, paths of task files, or ranges of instances such as ``long/v1/i000..i039``.
-    The entry ``"*"`` stands for all shipped tasks and all tasks of the user."""
+    The entry ``"*"`` stands for all shipped tasks and all tasks that a command adds."""
     methods: _Names
     """Ids of methods, exploration conditions, or wildcards. The entry ``"*"`` stands for all
     methods. If an entry of ``tasks`` or ``methods`` has a ``*``, methods are left out on tasks to
@@ -119,7 +119,7 @@ class _Block(FileData):
     """Allowed numbers of goals. Tasks with another number of goals are left out. By default all
     numbers are allowed."""
     runs: RunCount | None = None
-    """Number of runs of each method on each task; by default the number of the suite."""
+    """Number of runs of each stochastic method on each task; by default that of the suite."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
     """Dict that maps parameters of the methods to their values."""
     grid: dict[str, Annotated[tuple[_Value, ...], _SOME]] = Field(default_factory=dict)
@@ -287,15 +287,15 @@ def tasks_of(block: _Block, own: Collection[str], task_named: TaskNamed) -> Iter
     ----------
     block : _Block
     own : collection of str
-        Names of the user's tasks, which belong to a block with the entry ``*`` in ``tasks``.
+        Names of further tasks, which belong to a block with the entry ``*`` in ``tasks``.
     task_named : callable
         Function that returns the task with a given name or file.
 
     Yields
     ------
     Task
-        The tasks, in the order of the block. A task that is named twice is yielded once. Tasks with
-        a number of goals that the block does not allow (``goals``) are left out.
+        The tasks, in the order of the block. A name that occurs twice counts once. Tasks with a
+        number of goals that the block does not allow (``goals``) are left out.
 
     Raises
     ------

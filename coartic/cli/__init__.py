@@ -73,6 +73,8 @@ def main() -> None:
     - 0 after success;
     - 1 if the command found something wrong, after an error of the system, or after a bug;
     - 2 after a CoarticError or wrong usage.
+
+    After a signal, :func:`.end_if_interrupted` exits with another code.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:  # closed; otherwise a file would get its number

@@ -170,8 +170,8 @@ def resolve_methods(
     Returns
     -------
     list of str
-        Ids in the order of ``names``. The ids that match a wildcard are in the order of
-        ``registered``.
+        Ids, and wildcards that are not replaced, in the order of ``names``. The ids that match a
+        wildcard are in the order of ``registered``.
 
     Raises
     ------
@@ -203,7 +203,7 @@ def resolve_methods(
 def check_used(
     method_files: Sequence[Path] | None, registered: Registry, methods: Iterable[str]
 ) -> None:
-    """Raise CoarticError if there is a method file of which the command uses no method.
+    """Raise CoarticError for a method file whose methods the command does not use.
 
     Parameters
     ----------

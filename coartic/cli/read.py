@@ -1,4 +1,4 @@
-"""Commands that read stored runs (reports, checks, citations) and that draw."""
+"""Commands that report, check and cite stored runs, draw, and play in the browser."""
 
 from __future__ import annotations
 

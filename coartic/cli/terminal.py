@@ -166,13 +166,13 @@ class Display:
     def show(self, doing: str) -> None:
         """Show what the command is doing now.
 
-        If standard error is not a terminal, ``doing`` is printed only if at least ten seconds have
-        passed since the display was made and since the last such line.
+        If there is no line that is updated, ``doing`` is printed only if at least ten seconds have
+        passed since the display was made and since progress was last printed.
         """
         self._show(lambda: doing)
 
     def line(self, *texts: str) -> None:
-        """Print lines on standard error; on a terminal, above the line that is updated."""
+        """Print lines on standard error, above the line that is updated if there is one."""
         for text in texts:
             say(text, stream=sys.stderr)
 
@@ -186,8 +186,8 @@ class Display:
         """Show the progress of runs.
 
         The function is passed as argument ``watch`` to :func:`coartic.benchmarks.perform`. Before
-        the first run, when ``cell`` is None, it prints which runs are stored in the folder already,
-        and warnings about them. If all runs of the plan were stored before, no progress is shown.
+        the first run, when ``cell`` is None, it prints how many runs are stored in the folder, and
+        warnings about them. If all runs of the plan were stored before, no progress is shown.
         """
         if cell is None:
             self._say_present(progress)

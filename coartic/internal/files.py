@@ -37,8 +37,8 @@ def write_atomically(path: Path, data: bytes) -> None:
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write files into a folder, in place of the files of earlier calls.
 
-    Files of earlier calls that are not in ``files`` are removed, and so are subfolders that become
-    empty. Files that coartic did not write are never changed.
+    Files of earlier calls that are not in ``files`` are removed; so is the subfolder of a removed
+    file, if it is empty then. Files that :data:`LISTING` does not list are not changed.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
     -------
     set of str
         Paths of the files that :data:`LISTING` lists, relative to the folder; empty if the folder
-        has no such file, or a damaged one.
+        has no such file, or if that file contains a character that is not printable.
 
     Raises
     ------
@@ -151,10 +151,9 @@ def check_ending(path: Path, endings: Collection[str]) -> None:
 
 
 def check_output(path: Path, *, replace: bool) -> None:
-    """Raise CoarticError if a file cannot or must not be written to a path.
+    """Raise CoarticError if a file has no folder, or exists and must not be replaced.
 
-    This is the case if the folder of the file does not exist, or if the file exists and ``replace``
-    is False.
+    An existing file may be replaced if ``replace`` is True. Permissions are not checked.
     """
     with describe_os_errors(path):
         if not path.parent.is_dir():

@@ -1,4 +1,4 @@
-"""Largest sizes of plans, and checks of numbers that users pass."""
+"""Largest values of numbers that users pass, and checks of such numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MAX_CELLS = 10_000
-"""Largest number of cells of a suite."""
+"""Largest number of instances that a range of instances names, and of episodes of a score."""
 MAX_RUNS = 1_000_000
 """Largest number of runs of a cell."""
 MAX_TRIALS = 10_000_000
@@ -87,8 +87,8 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
 
     ``value`` is a number, an array, or a list of numbers or of lists. An ``ndarray`` of float64 is
     returned without a copy. NaN and infinity are allowed. Raises ValueError for strings, complex
-    numbers, True and False, rows of unequal length, masked entries, integers that are too large for
-    float64, and any other objects that are not real numbers.
+    numbers, True and False, rows of unequal length, masked entries of NumPy, integers that are too
+    large for float64, and any other objects that are not real numbers.
     """
     import numpy as np  # slow to import, and the help of commands does not need it
 

@@ -111,8 +111,8 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
     """Make this process a worker: the leader of a new process group.
 
-    If the process gets SIGTERM, exits, or loses its parent, the process and all processes of the
-    group are killed.
+    If the process gets SIGTERM, ends normally, or loses its parent, the process and all processes
+    of the group are killed.
 
     Parameters
     ----------

@@ -26,8 +26,8 @@ def _library_folders() -> tuple[Path, ...]:
 def is_users(module: str, path: Path) -> bool:
     """Return whether a module belongs to the user and was loaded from a file.
 
-    A module belongs to the user if it is not a part of coartic, of the standard library or of an
-    installed package.
+    A module belongs to the user if it is not a part of coartic or of the standard library, and is
+    not in a folder of installed packages, such as ``site-packages``.
 
     Parameters
     ----------

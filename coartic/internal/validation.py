@@ -43,9 +43,9 @@ def describe_validation_errors(kind: type[T]) -> type[T]:
 def equal_contents(a: Any, b: Any) -> Any:
     """Compare two objects field by field; classes with arrays use this function as ``__eq__``.
 
-    Two arrays are equal if their shapes and entries are equal. NaN is treated as equal to NaN and
-    to a masked entry. Fields of a dataclass with ``compare=False`` are ignored. The result is
-    NotImplemented if the objects have different classes.
+    Two arrays are equal if their shapes and entries are equal. In arrays, NaN is treated as equal
+    to NaN and to a masked entry. Fields of a dataclass with ``compare=False`` are ignored. The
+    result is NotImplemented if the objects have different classes.
     """
     import numpy as np
 
@@ -77,7 +77,8 @@ def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool =
     """Return a sentence that describes one problem of a validation error.
 
     The sentence describes the first unknown key or, if there is none, the first problem. It names
-    the key and, if the value is wrong, the value.
+    the key and, if the value is wrong, the value. An error of :func:`described_error` is described
+    by its text alone.
 
     Parameters
     ----------

@@ -362,9 +362,10 @@ def movement_data(movement: Movement) -> list[Any]:
 
     Workers send movements in this form, hashes are computed from it, and folders store it. The last
     entry of the list is a JSON string: the target, or the waypoints of a movement of kind ``path``.
-    In the string, -0.0 is 0.0, and an entry of a target that is NaN is null. If the movement has no
-    ticks or no target, the entry of the list is None. Raises an error, such as TypeError or
-    ValueError, for a movement that cannot be converted.
+    In the string, -0.0 is 0.0, and an entry of a target that is NaN is null. The fourth entry is
+    None for a movement without ticks, and the last entry is None for a movement with neither target
+    nor waypoints. Raises an error, such as TypeError or ValueError, for a movement that cannot be
+    converted.
     """
     m, path = movement, movement.target
     if m.waypoints is not None:

@@ -4,8 +4,8 @@ A claim says that a mean over tasks lies beyond a bound (:func:`mean_beyond`), o
 several means does (:func:`all_of`). :func:`judge` adjusts the p-values of all claims of a study
 together, by Holm's method. Two rules make verdicts stricter:
 
-- Each test is made a second time without the task that favours the claim most. A claim is supported
-  only if it is significant both times.
+- Each test is made a second time without the task that favours the claim most. A claim with tests
+  is supported only if they are significant both times.
 - If the values over tasks are very skewed, the level of significance is 1 % instead of 5 %
   (:func:`level_of`).
 """
@@ -75,7 +75,8 @@ def two_sided_tests(samples: Mapping[Any, ArrayLike], resamples: int | None = No
     Parameters
     ----------
     samples : mapping
-        Dict that maps the name of each sample to its values, one for each task, shape ``(tasks,)``.
+        Dict that maps the name of each sample to its values, one for each task, shape ``(tasks,)``,
+        for at least two tasks.
     resamples : int, optional
         Number of bootstrap samples; by default :data:`RESAMPLES_OF_CLAIMS`.
 
@@ -92,8 +93,8 @@ def two_sided_tests(samples: Mapping[Any, ArrayLike], resamples: int | None = No
           (:func:`level_of`). If one of them is NaN, only the other is compared. If both are NaN,
           the value is False.
 
-        Both columns of p-values are Holm-adjusted over all samples. A p-value is NaN if all tested
-        values are 0, or if there is only one value.
+        Each column of p-values is Holm-adjusted over the samples that have a p-value in it. A
+        p-value is NaN if all tested values are 0, or if only one value is tested.
     """
     values = {name: np.asarray(each, dtype=np.float64) for name, each in samples.items()}
     means = [each.mean() for each in values.values()]
@@ -134,7 +135,8 @@ class Finding:
     without: tuple[Estimate, ...] = ()
     """The tests in :attr:`tests`, each made again without the task that favours the claim most."""
     level: float = LEVEL
-    """Level of significance of the tests: the smallest :func:`level_of` of the tested values."""
+    """Level of significance of the tests: the smallest level that :func:`level_of` gives for any of
+    the tested samples."""
 
     @property
     def opposite_p(self) -> float:
@@ -224,7 +226,7 @@ def mean_beyond(
         - ``against`` contains one test of the opposite of the claim. This test is made with all
           tasks and without the task that favours the opposite most; the one with the larger p-value
           is returned.
-        - ``level`` is :func:`level_of` the values.
+        - ``level`` is the level that :func:`level_of` gives for the values.
 
     Raises
     ------
@@ -393,6 +395,8 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
         The file lacks a claim of ``values``, a claim has no ``text``, ``test`` or ``means``, or the
         file and ``values`` have different numbers of means for a claim. The errors of
         :func:`mean_beyond` are raised, too.
+    KeyError
+        The table of a mean has no ``sentence`` or no bound.
     FileNotFoundError
         The file does not exist.
     tomllib.TOMLDecodeError

@@ -1,4 +1,4 @@
-"""Write the tables and the page of a study, and a suite of its missing control runs."""
+"""Write the tables, the figure and the page of a study, and a suite of its missing controls."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def write_study(
 def stored_picture(draw: Callable[..., Any], *arguments: Any, **options: Any) -> bytes:
     """Draw a figure in the font that comes with Matplotlib, and return it as SVG.
 
-    The font makes stored figures the same on every machine.
+    With this font, stored figures do not depend on the fonts of a machine.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def expect(holds: bool, what: str) -> str:
 
 
 def control_suite(study: Study, *, runs: int = 20) -> str:
-    """Return a suite of the random search that a study lacks as control of signatures.
+    """Return a suite of the random-search runs that a study lacks as controls of signatures.
 
     The suite contains a block for each method that can select its solution from trials, each task,
     and each hand sequence that occurs in at least a tenth of the method's solved runs on the task.
