@@ -57,7 +57,7 @@ NEGLIGIBLE = 1e-9
 
 @dataclass(frozen=True)
 class Estimate:
-    """An estimate with its confidence interval and p-value; NaN where these were not computed."""
+    """An estimate with its confidence interval and p-value, which are NaN if not computed."""
 
     value: float
     """The estimate: a mean, a difference or another number."""

@@ -521,7 +521,7 @@ def score(
         - the environments of a vector environment have different options;
         - an option is missing or unknown;
         - an agent has other spaces than the environment;
-        - an agent was trained with wrappers, and the environment has none;
+        - an agent was trained with such other wrappers, and the environment has none;
         - a wrapper does not pass on the options of ``reset``.
     ValueError
         An option is wrong, options are passed for an environment with wrappers, the name of a

@@ -67,9 +67,9 @@ class Execution:
 
     - A goal that is hit without a movement has a corrective movement of 0 ticks.
     - With motor noise, targets are those without the noise.
-    - Several corrections for a goal, which occur only with motor noise, are combined into one
-      movement. Its target is the last configuration of the last corrective process, and its ticks
-      are the sum of the ticks of these corrections.
+    - With motor noise, the corrective process can act several times for a goal. These corrections
+      are combined into one movement. The target of this movement is the last configuration of the
+      last corrective process, and its ticks are the sum of the ticks of these corrections.
     """
     configurations: Array
     """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, in length units
@@ -492,11 +492,11 @@ def execute_noisy(
     The robot stands at q. Coordinate c of a noisy target is, with standard normal numbers z::
 
         aimed movement         t_c + s z_c              if c moves, else q_c
-        waypoint k of K        w_kc + (k / K) s z_c     if c moves, else q_c
+        waypoint k of W        w_kc + (k / W) s z_c     if c moves, else q_c
         correction             a_c + s min(1, L) z_c    for base and chosen arm, else a_c
 
     - An *aimed movement* is a learned or planned movement with the target t. A path has the
-      waypoints w_1 to w_K and one vector z; it is not steered while it is made (open loop).
+      waypoints w_1 to w_W and one vector z; it is not steered while it is made (open loop).
     - A coordinate *moves* if its entry of the target, or of any waypoint, is a number that differs
       by more than 1e-9 from where the robot stands now. A locked base does not move.
     - The target of a *correction* is the configuration a that the corrective process finds from q.
