@@ -32,7 +32,7 @@ LEVEL = 0.05
 Resamples = Annotated[int, Field(ge=1, le=10_000_000)]
 """Type of a parameter: number of bootstrap resamples."""
 RESAMPLES = 9_999
-"""Default number of resamples: one less than 10,000, of which 5 % and 1 % are integers."""
+"""Default number of resamples: 10,000 - 1, because 5 % and 1 % of 10,000 are integers."""
 SEED = 0
 """Seed of resampling."""
 MIN_VALUES = 5
@@ -43,8 +43,9 @@ FEWER_RESAMPLES = 1_999
 """Number of resamples where resampling is slow: for large samples, and over instances of
 families."""
 LARGE = 500
-"""Largest size of a sample for which a BCa interval is computed. A larger sample has a percentile
-interval of at most :data:`FEWER_RESAMPLES` resamples, which BCa would hardly change."""
+"""Largest size of a sample for which a BCa interval is computed. A larger sample, up to
+:data:`HUGE`, has a percentile interval of at most :data:`FEWER_RESAMPLES` resamples, which BCa
+would hardly change."""
 HUGE = 50_000
 """Largest size of a sample that is resampled. A larger sample has a normal interval."""
 IN_CACHE = 1 << 18
@@ -56,7 +57,7 @@ NEGLIGIBLE = 1e-9
 
 @dataclass(frozen=True)
 class Estimate:
-    """An estimate with its confidence interval and p-value; numbers not computed are NaN."""
+    """An estimate with its confidence interval and p-value, which are NaN if not computed."""
 
     value: float
     """The estimate: a mean, a difference or another number."""
@@ -198,7 +199,8 @@ def mean_of_means(
     weights : sequence of float
         Factor by which the mean of each sample is multiplied.
     resamples : int
-        Number of bootstrap resamples.
+        Number of bootstrap resamples. If a sample has more than :data:`LARGE` values, at most
+        :data:`FEWER_RESAMPLES` resamples are drawn.
 
     Returns
     -------

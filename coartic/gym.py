@@ -113,7 +113,7 @@ class TaskEnv(gymnasium.Env):
     Raises
     ------
     ValueError, TypeError, TaskError
-        An option is wrong, or the task or family is unknown.
+        An option other than ``render_mode`` is wrong, or the task or family is unknown.
 
     Notes
     -----
@@ -218,9 +218,10 @@ class TaskEnv(gymnasium.Env):
         Raises
         ------
         ValueError
-            The option or the instance does not exist.
+            The option or the instance does not exist, or a tolerance of the model does not fit the
+            radius of the goals.
         gymnasium.error.Error
-            The seed is not an integer of at least 0.
+            The seed is not a Python int of at least 0.
         """
         super().reset(seed=seed)
         if seed is not None or self.draw < 0:
@@ -305,7 +306,7 @@ class TaskEnv(gymnasium.Env):
     def render(self) -> NDArray[np.uint8] | None:
         """Draw the robot and its goals; goals that were hit are filled.
 
-        The first trial must have begun.
+        Call :meth:`reset` first.
 
         Returns
         -------
@@ -403,8 +404,9 @@ class SharesOfTicks(gymnasium.RewardWrapper):
     """Wrapper that divides the rewards by the ticks of the corrective process.
 
     The divisor is the number of ticks that the corrective process on its own takes for the whole
-    task with the initial hands and without motor noise, but at least 1. If the process does not
-    complete the task, the divisor is 1,000,000. A scaled reward below -2 is raised to -2.
+    task with the initial hands and without motor noise, but at least 1. The divisor is 1,000,000 if
+    the process does not complete the task, or if the task's policy finds no initial hands. A scaled
+    reward below -2 is raised to -2.
     """
 
     def __init__(self, env: gymnasium.Env) -> None:
@@ -468,10 +470,11 @@ def score(
     ----------
     env : str, Env, VectorEnv or VecEnv
         Id, or environment of this module. For a family, the instances of the test split are scored,
-        unless the options name another ``split``. If an environment has wrappers that change
-        observations or actions, agents and functions are scored in the wrapped environment, and all
-        rows on its own instances. The rewards in the table are nevertheless in ticks, and the
-        statistics of normalising wrappers are not updated.
+        unless the options name another ``split``. If an environment has wrappers other than
+        ``VecNormalize`` and those that ``gymnasium.make`` and :func:`sb3` add, agents and functions
+        are scored in the wrapped environment, and the instances are those of the environment. The
+        rewards in the table are nevertheless in ticks, and the statistics of normalising wrappers
+        are not updated.
     policy : callable, agent, Method or mapping, optional
         One of
 
@@ -486,26 +489,23 @@ def score(
         Seed of random actions, of methods, of an environment with wrappers and of the motor noise.
     vec_normalize : str, Path or VecNormalize, optional
         Normalisation of observations: the ``VecNormalize`` of an agent's training, or the file that
-        its ``save`` has written (a pickle: open only files that you trust). The default is the
-        ``VecNormalize`` of ``env`` if it is the only wrapper of ``env``. Otherwise the default is
-        the ``VecNormalize`` of the agent's own environment, unless ``env`` normalises observations
-        itself.
+        its ``save`` has written (a pickle: open only files that you trust). By default the
+        ``VecNormalize`` of ``env`` is used, or else that of the agent's own environment.
     **options
-        Options of :class:`TaskEnv`, for an environment without wrappers.
+        Options of :class:`TaskEnv`. An environment with other wrappers, as above, takes none.
 
     Returns
     -------
     DataFrame
         A row for each policy, for uniformly random actions, for the corrective process with the
-        initial hands of each task, and for the best known solution. Columns:
+        initial hands of each task, and for the best known solutions. Columns:
 
         - ``reward``: mean reward over all trials of all tasks (in ticks);
         - ``gap``: mean relative gap over the tasks whose best reward is known. The relative gap is
           (best known reward - reward) / abs(best known reward);
         - ``gap_low``, ``gap_high``: 95 % bootstrap interval of the gap over tasks, or over the
           trials of a single task (:func:`coartic.estimates.mean`);
-        - ``completed``: share of trials that hit all goals in less than 1,000,000 ticks; NaN for
-          the best known solution.
+        - ``completed``: share of trials that hit all goals; NaN for the best known solutions.
 
         With motor noise there are 100 trials of each policy, of random actions and of the
         corrective process on each task. Without motor noise there are ``episodes`` trials of random
@@ -519,13 +519,16 @@ def score(
 
         - the environment is not of this module;
         - the environments of a vector environment have different options;
+        - an option is missing or unknown;
         - an agent has other spaces than the environment;
-        - an agent was trained with wrappers that the environment does not have;
+        - an agent was trained with such other wrappers, and the environment has none;
         - a wrapper does not pass on the options of ``reset``.
     ValueError
         An option is wrong, options are passed for an environment with wrappers, the name of a
-        policy is the name of another row, a function does not return a row of actions for each
-        observation, or observations would be normalised twice.
+        policy is the name of another row, a function returns an array of actions with a wrong
+        shape, or observations would be normalised twice.
+    TaskError
+        The task or family is unknown.
     OSError
         The file of ``vec_normalize`` cannot be read.
     gymnasium.error.Error
@@ -539,10 +542,11 @@ def score(
 
     Notes
     -----
-    With motor noise, all rows, including random actions, are scored on the same 100 noise draws for
-    each task. No method uses these draws in its own trials. Solutions of methods and of the
-    corrective process are executed by :func:`coartic.execute_noisy`. :attr:`.Objective.best_known`
-    lists the tasks and models whose best reward is known.
+    With motor noise, policies, random actions and the corrective process are scored on the same 100
+    noise draws for each task. No method uses these draws in its own trials. Solutions of methods
+    and of the corrective process are executed by :func:`coartic.execute_noisy`. The best known
+    rewards come with the package; :attr:`.Objective.best_known` lists the tasks and models that
+    have one.
 
     Examples
     --------
@@ -667,8 +671,8 @@ def _actions_of(
     wrappers : list
         Wrappers of ``env`` that change observations or actions.
     normal : VecNormalize or None
-        Normalisation of observations. If it is None, and no wrapper normalises observations, the
-        normalisation of the agent's own environment is used.
+        Normalisation of observations. If it is None, and no wrapper is a ``VecNormalize``, the
+        ``VecNormalize`` of the agent's own environment is used.
 
     Returns
     -------
@@ -678,7 +682,8 @@ def _actions_of(
     Raises
     ------
     TypeError
-        The agent was trained with other spaces or wrappers than ``env`` has.
+        The agent has other spaces than ``env``, or was trained with wrappers although ``wrappers``
+        is empty.
     """
     normalised = any(map(_normalises, wrappers))
     if normal is None and not normalised:

@@ -53,15 +53,17 @@ class MotionModel(NamedTuple):
     trial fails if a correction needs more iterations."""
 
     motor_noise: float = 0.0
-    """s: standard deviation of the Gaussian noise that displaces each coordinate of a movement's
-    target, in length units (base) and rad (joints). The paper's robot has no motor noise. The rule
-    is in ``docs/model.md``, section *Motor noise*."""
+    """s: standard deviation of the Gaussian noise that displaces the target of a movement in the
+    coordinates that move, in length units (base) and rad (joints). Short corrections have less
+    noise. The paper's robot has no motor noise. The rule is in ``docs/model.md``, section *Motor
+    noise*."""
 
     norm: Norm = "euclidean"
     """Norm of joint space in which a step has the length ``step``:
 
     - ``"euclidean"`` (published);
-    - ``"maximum"``: the coordinate that moves farthest moves by ``step``."""
+    - ``"maximum"``: the coordinate that moves farthest, after base coordinates are multiplied by
+      ``base_weight``, moves by ``step``."""
 
     base_weight: float = 1.0
     """w: in the length of a movement, a length unit of the base counts as much as w rad of a joint.
@@ -173,7 +175,7 @@ def check_exact(model: MotionModel, *, radius: float | None = None) -> MotionMod
 def refuse_noise(model: MotionModel) -> None:
     """Raise ValueError if a model has motor noise.
 
-    Functions that draw no random numbers call this function.
+    The error message says that the calling function draws no random numbers.
     """
     if model.motor_noise > 0.0:
         raise ValueError(

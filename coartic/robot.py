@@ -127,8 +127,8 @@ class Robot:
     A configuration ``q`` has shape ``(dof,)``: x and y of the base (in length units), the joint
     angles of the left arm and the joint angles of the right arm (in rad, each measured from the
     link before). Methods that accept arrays accept one configuration or many, shape ``(..., dof)``.
-    They raise ValueError if ``q`` has a wrong shape or is not finite, or if a hand is neither
-    ``"left"`` nor ``"right"``.
+    They raise ValueError if ``q`` has a wrong shape or has entries that are not finite real
+    numbers, or if a hand is neither ``"left"`` nor ``"right"``.
     """
 
     left_links: _Lengths = (1.0, 1.0, 1.0, 1.0)
@@ -147,7 +147,7 @@ class Robot:
     def scale(self) -> float:
         """Scale of drawings: the length of the shorter arm divided by 4.
 
-        The paper's arms have length 4.
+        Both arms of the paper's robot have length 4.
         """
         return min(math.fsum(self.left_links), math.fsum(self.right_links)) / 4.0
 

@@ -34,7 +34,8 @@ class MoveResult(NamedTuple):
     """True if the hand is within the goal's radius."""
     evaluations: int
     """Number of forward-kinematics evaluations. On a path there is one per tick. On a straight
-    movement there can be fewer, because steps that cannot end the movement are skipped."""
+    movement, steps that cannot end the movement are not evaluated, and the target is evaluated
+    before the movement if ``stop_on_arrival`` is True."""
 
 
 class Correction(NamedTuple):
@@ -308,7 +309,7 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
 
 
 def one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Batch:
-    """Return a batch of kernels with one run, whose configuration and target are ``q``.
+    """Return a batch for kernels that contains one run with configuration and target ``q``.
 
     Parameters
     ----------

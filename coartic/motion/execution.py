@@ -2,7 +2,7 @@
 
 A solution is executed from the task's start by the rule of :mod:`coartic.motion.kernels.trial`, and
 the control ticks of all movements are counted. If the movements miss a goal, the corrective process
-moves the hand into the goal. The score of a solution is the reward of this execution; a reward that
+acts. The score of a solution is the reward of this execution; a reward that
 a method itself reports is ignored.
 
 :func:`execute` executes a solution once without noise. :func:`execute_noisy` executes solutions
@@ -67,9 +67,9 @@ class Execution:
 
     - A goal that is hit without a movement has a corrective movement of 0 ticks.
     - With motor noise, targets are those without the noise.
-    - Several corrections for a goal, which occur only with motor noise, are combined into one
-      movement. Its target is the last configuration of the last corrective process, and its ticks
-      are the sum of all ticks.
+    - With motor noise, the corrective process can act several times for a goal. These corrections
+      are combined into one movement. The target of this movement is the last configuration of the
+      last corrective process, and its ticks are the sum of the ticks of these corrections.
     """
     configurations: Array
     """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, in length units
@@ -439,8 +439,8 @@ def execute_noisy(
     """Execute solutions of a task many times with motor noise, and count the ticks.
 
     Gaussian noise displaces the target of each movement. If a goal is missed, the corrective
-    process makes corrective movements, which are noisy as well, until the hand hits the goal. All
-    other rules are as in :func:`coartic.execute`.
+    process makes corrective movements, which are noisy as well, until the hand hits the goal or the
+    execution fails. All other rules are as in :func:`coartic.execute`.
 
     Parameters
     ----------
@@ -474,7 +474,8 @@ def execute_noisy(
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or an argument has a wrong type.
+        The task cannot be used, or ``task``, ``solutions``, ``model`` or ``signal_dependent`` has a
+        wrong type.
     SolutionError
         One of these is the case:
 
@@ -483,19 +484,19 @@ def execute_noisy(
           ticks of the execution without noise, for example because the solution belongs to another
           task.
     ValueError
-        ``motor_noise``, ``repeats``, ``seed`` or a constant of the model is out of bounds, the
-        model has motor noise, or the number of seeds is not the number of solutions.
+        ``motor_noise``, ``repeats``, ``seed`` or a constant of the model has a wrong type or is out
+        of bounds, the model has motor noise, or the number of seeds is not the number of solutions.
 
     Notes
     -----
     The robot stands at q. Coordinate c of a noisy target is, with standard normal numbers z::
 
         aimed movement         t_c + s z_c              if c moves, else q_c
-        waypoint k of K        w_kc + (k / K) s z_c     if c moves, else q_c
+        waypoint k of W        w_kc + (k / W) s z_c     if c moves, else q_c
         correction             a_c + s min(1, L) z_c    for base and chosen arm, else a_c
 
     - An *aimed movement* is a learned or planned movement with the target t. A path has the
-      waypoints w_1 to w_K and one vector z; it is not steered while it is made (open loop).
+      waypoints w_1 to w_W and one vector z; it is not steered while it is made (open loop).
     - A coordinate *moves* if its entry of the target, or of any waypoint, is a number that differs
       by more than 1e-9 from where the robot stands now. A locked base does not move.
     - The target of a *correction* is the configuration a that the corrective process finds from q.

@@ -54,7 +54,7 @@ def ranked_sequences(
 
         - by reward, the highest first and failed trials last;
         - then by the number of changes of hand, the fewest first;
-        - then as in ``sequences``.
+        - then in the order of ``sequences``.
     """
     exact = model.without_noise()
     compiled, codes = compiled_task(task, exact), hand_codes(task, [*sequences], len(sequences))

@@ -85,10 +85,10 @@ def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
 
 
 def next_action(movements: Iterable[Movement]) -> tuple[Movement, ...]:
-    """Return copies of movements without the results of one noisy execution.
+    """Return copies of movements that can be executed again with other noise.
 
-    In the copies all ticks, and the targets of corrective movements, are None, because they depend
-    on the noise of that execution. The copies can be executed again with other noise.
+    In the copies all ticks, and the targets of corrective movements, are None, because these
+    results depend on the noise of the execution in which the movements were made.
     """
     return tuple(
         replace(movement, ticks=None, target=None)

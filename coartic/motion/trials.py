@@ -157,8 +157,7 @@ class Reached(NamedTuple):
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes one more than its
-    iterations."""
+    """Forward-kinematics evaluations, shape ``(N,)``; a correction of k iterations takes k + 1."""
 
 
 @checked_arguments
@@ -332,8 +331,8 @@ _outside = 0
 def count_trials(count: int) -> None:
     """Add to the number of trials that this process made outside sessions of runs.
 
-    Trials are added whenever they are made. The session of a run then subtracts the trials that it
-    made itself, by a negative ``count``. :func:`trials_outside` returns the number.
+    The trials that the session of a run makes are added as well; the session then subtracts them by
+    a negative ``count``. :func:`trials_outside` returns the number.
     """
     global _outside
     _outside += count
@@ -434,8 +433,7 @@ class Trials(NamedTuple):
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes one more than its
-    iterations."""
+    """Forward-kinematics evaluations, shape ``(N,)``; a correction of k iterations takes k + 1."""
     targets: Configs
     """Targets of the movements, shape ``(N, G, dof)``, in length units and rad. A coordinate whose
     entry was passed as NaN has its value at the beginning of the movement. All entries of a goal

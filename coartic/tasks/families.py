@@ -5,19 +5,19 @@ file contains the distributions from which the number and the positions of the g
 the arms, the base and the start are drawn. The file of a released family does not change; a changed
 family gets a new version.
 
-An instance is a task with a name such as ``two-armed/v1/i017``. It depends only on the file of the
-family and on its name, because its numbers come from a counter-based random number generator
+An instance is a task with a name such as ``two-armed/v1/i017``. It depends only on this name and on
+the file of the family, because its numbers come from a counter-based random number generator
 (:mod:`coartic.tasks.philox`). The key of the generator is a hash of family, version and stream; its
 counter contains the number of the instance. Streams are ``d`` (development, to tune on), ``i``
 (test, to report on) and years such as ``2027-`` (fresh instances, to check a finished method on).
 
-An instance is drawn in two stages. The *structure* (number of goals and links, base, starting
-postures, direction of a line of goals) is drawn once. Positions and angles are drawn again until
-they break no rule (rejection sampling, :func:`broken_rule`). Rejection therefore does not change
-the frequencies of the structures. Positions and angles are drawn as integers, in thousandths.
-Geometric rules compare integers; the other rules use the compiled kernels, which need only IEEE
-arithmetic (:mod:`coartic.motion.kernels.trigonometry`). No rejection depends on a machine's
-library.
+An instance is drawn in two stages. The *structure* (number of goals and links, kind of base,
+distribution of the starting postures, whether a line of goals is horizontal or vertical) is drawn
+once. Positions and angles are drawn again until they break no rule (rejection sampling,
+:func:`broken_rule`). Rejection therefore does not change the frequencies of the structures.
+Positions and angles are drawn as integers, in thousandths. Geometric rules compare integers; the
+other rules use the compiled kernels, which need only IEEE arithmetic
+(:mod:`coartic.motion.kernels.trigonometry`). No rejection depends on a machine's library.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ from coartic.tasks.task import (
 
 FAMILY_FOLDER = Path(__file__).parent / "families"
 COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}
-"""Default number of instances of each split, which begin with instance 0."""
+"""Dict that maps each split to its default number of instances. The first is instance 0."""
 MAX_ATTEMPTS = 10_000
 """Largest number of drafts of one instance (:func:`instance_of`)."""
 Base = Literal["free", "rail", "locked"]
@@ -108,8 +108,8 @@ def _as_share(limits: tuple[int, int]) -> tuple[int, int]:
 
 _ordered = AfterValidator(_in_order)
 Range = Annotated[tuple[Thousandths, Thousandths], _ordered]
-"""Type of a range: the lowest and the highest value. Both values, and all thousandths between them,
-are equally likely."""
+"""Type of a range: the lowest and the highest value. A number that is drawn from a range is one of
+these values or of the thousandths between them, with equal probabilities."""
 _GoalsCount = Annotated[int, Field(strict=True, ge=2, le=MAX_GOALS)]
 _PerArm = Annotated[int, Field(strict=True, ge=3, le=8)]
 _Bases = tuple[Base, ...]
@@ -141,7 +141,7 @@ class _Alignment(FileData):
     """Smallest and largest distance from goal to goal along the line (in length units)."""
     off: Range
     """Smallest and largest distance of the goal that is off the line from the line (in length
-    units). Both sides of the line are equally likely."""
+    units). It is drawn on either side of the line with equal probability."""
 
 
 class Posture(FileData):
@@ -194,7 +194,7 @@ class Family(FileData):
     """Kinds of base, equally likely: ``"free"``, ``"rail"`` (the base cannot move in y) or
     ``"locked"``. Each instance has one of them."""
     restrictions: _Bases = ()
-    """Kinds of base with which every instance can be completed, in addition to its own."""
+    """Further kinds of base with which the corrective process completes each instance as well."""
     radius: Thousandths = 100
     """Radius of every goal (in length units)."""
     region: _Region
@@ -214,7 +214,7 @@ class Family(FileData):
     for each of ``hands``."""
     within: Thousandths = 950
     """Largest distance of a goal from the shoulder of each of ``hands`` at the start, as a fraction
-    of ``reach``. Only coordinates in which the base is locked count in the distance."""
+    of ``reach``. Coordinates in which the base can move do not count in the distance."""
     bent: Thousandths = 200
     """Angle (in rad). At the start, the arm of each of ``hands`` has a joint, other than the first,
     that is bent by at least this angle."""

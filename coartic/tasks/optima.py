@@ -3,7 +3,8 @@
 - ``optima.json`` contains the best known rewards of the paper's tasks, also with further locks of
   the base or a still idle arm, with run ids and solutions.
 - ``best_known.csv`` contains the best known rewards of test instances of families.
-- ``best_in_noise.csv`` contains the fewest mean ticks known for tasks with motor noise 0.01.
+- ``best_in_noise.csv`` contains the fewest mean ticks known, with motor noise 0.01, for the paper's
+  tasks and for test instances of families.
 
 The study ``studies/optima`` copies better rewards from results folders, and proves the bounds.
 """

@@ -2,8 +2,8 @@
 
 Numba is imported at the first call of a kernel, so that a command that only lists names does not
 need it. The machine code is stored on disk. Numba compiles a stored function again if the file of
-this function has changed, but not if the function calls a function in another file, and only that
-file has changed. Therefore the name of the folder of the machine code contains a hash of
+this function has changed. It does not notice changes in the files of other functions that the
+function calls. Therefore the name of the folder of the machine code contains a hash of
 :data:`KERNEL_FILES`. If one of these files changes, all kernels are compiled again.
 """
 
@@ -122,8 +122,8 @@ over a known shape."""
 scalar = _decorator("scalar")
 """A kernel with scalar arguments, which Python and other compiled functions may also call."""
 intrinsic: Callable[[Any], Any] = _decorator("intrinsic")
-"""A function that returns the type of a call in a kernel, and a function that builds the machine
-code of the call."""
+"""A function that returns a pair: the type of a call in a kernel, and a function that builds the
+machine code of this call."""
 
 
 # ---- What kernels share ----
@@ -375,8 +375,8 @@ class _MachineCode:
     """Cache of a function's machine code on disk, with the interface of Numba's caches.
 
     If several processes need the same code, one process compiles the code and the other processes
-    wait, at most 120 s, provided that files can be locked. Code that is damaged or cannot be stored
-    is compiled again.
+    wait, at most 120 s, provided that files can be locked. Code that cannot be loaded or stored is
+    compiled again.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -407,7 +407,7 @@ class _MachineCode:
     def load(self, *signature: Any) -> Any:
         """Return the machine code of a signature from disk, or None if there is none.
 
-        If the file cannot be opened or is damaged, the index of the function's code is emptied.
+        If loading raises an error, the index of the function's code is emptied.
         ``signature`` is as Numba passes it.
         """
         try:

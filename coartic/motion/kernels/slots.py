@@ -28,7 +28,8 @@ from coartic.motion.kernels.trigonometry import MAX_ANGLE, cosine, near_cosine, 
 from coartic.robot import BASE_DOF, HANDS, Arm, Robot
 
 SLOTS = 72
-"""Number of slots of a batch, so small that they fit into the processor's first-level cache."""
+"""Number of slots of a batch. The arrays of a movement of four-link arms then fit into the
+processor's first-level cache."""
 _VECTOR = 8  # number of slots in a vector; SLOTS is a multiple of it
 NORMS = get_args(Norm)
 """Norms of joint space. Kernels represent a norm by its index in this tuple."""
@@ -177,8 +178,8 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
         "target": (np.float64, width),  # of a movement, as asked for; where A has ended
         "end": (np.float64, width),  # where the movement ends unless it stops: target with noise
         "preferred": (np.float64, width),  # preferred posture, in length units and rad
-        # Shares of the path to it: by which the mean of exploration moves, and which an iteration
-        # of the corrective process adds.
+        # Gains of null-space steps to the preferred posture: of the step of exploration, and of
+        # the step in each iteration of the corrective process.
         "nullspace_exploration_gain": np.float64,
         "nullspace_correction_gain": np.float64,
         "goal": (np.float64, 2),  # x and y, in length units
@@ -186,14 +187,14 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
         "world": np.uint64,  # key of the noise: see coartic.motion.kernels.noise
         "number": np.int64,  # of the goal, from 0
         "made": np.int64,  # movements made for this goal
-        "action": np.int64,  # the next action: see coartic.motion.kernels.trial
+        "action": np.int64,  # the next action: see coartic.motion.kernels.move.IDLE
         "corrects": np.bool_,  # True if the corrective process acts where a movement misses
         "going": np.bool_,  # True if the run has hit every goal so far
         "acting": np.bool_,  # True if the run is among those that are moved or corrected next
         "hit": np.bool_,  # True if the hand is within the goal's radius
         "converged": np.bool_,  # True if the corrective process has converged
         "ticks": np.int64,  # of the movement, or of all corrections for the goal
-        "spent": np.int64,  # of these, of the corrections before the present one
+        "spent": np.int64,  # ticks of the corrections before the present one
         "corrections": np.int64,  # corrective movements made for the goal
         "iterations": np.int64,  # of the corrective process for the goal
         "evaluations": np.int64,  # of forward kinematics, since the last record
