@@ -5,9 +5,11 @@ opens ``FOLDER/runs.sqlite`` and checks that
 
 - the solution of each run (and the first trial and the replay of a learner) obeys the rules, hits
   all goals, and has the stored ticks, reward and hands;
-- no joint angle and no reward of a trial was changed after the run, which a stored hash shows;
-- the id, the seed and the labels of each run are those of its task, method, parameters and world;
+- the stored hash of each run is that of its movements and of the rewards of its trials;
+- the id, the seed and the labels of each run fit the task, method, parameters and world;
 - the folder has all runs that the plan asks for.
+
+Other columns, such as times, are not checked.
 
 The rules (Shah, Barto & Fagg 2013, *A Dual Process Account of Coarticulation in Motor Skill
 Acquisition*):
@@ -24,7 +26,8 @@ Acquisition*):
   made if the goal is not hit yet.
 - A movement of kind *path* leads through waypoints. It stops on a hit, or at the last waypoint.
 - The targets of corrective movements are stored; the corrective process is not run again.
-- With motor noise, only goals, hands and targets are checked. A run then stores no ticks.
+- With motor noise, only the goals, hands and targets of movements are checked. A run then stores
+  no ticks.
 """
 
 from __future__ import annotations
