@@ -13,8 +13,8 @@ each run, and the columns
 Gaps, shares and rankings are computed from the *value* of each run: its reward, or minus its
 ``mean_ticks`` in a world with motor noise (:func:`.run_values`). If you have the costs of an
 ``Objective``, use their negatives as rewards. The functions raise CoarticError for a frame with
-wrong values. Functions with a result for each method also raise CoarticError if the runs are in
-different worlds.
+wrong values. Functions with a result for each method also raise CoarticError if the frame has a
+column ``world`` that names several worlds.
 """
 
 from __future__ import annotations
@@ -469,7 +469,8 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     CoarticError
         A column or a name is missing, a reward is wrong (:func:`relative_gaps`, :func:`shares`), a
         task has more than one best known reward or, without noise, more than one
-        ``corrective_best``, a run has two rows (:func:`ranking`), or runs are in different worlds.
+        ``corrective_best``, a run has two rows (:func:`ranking`), or column ``world`` names several
+        worlds.
 
     Examples
     --------
@@ -556,7 +557,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         - A task has more than one best known reward or, without noise, more than one
           ``corrective_best``.
         - A run has two rows.
-        - Runs have different budgets, or are in different worlds.
+        - Runs have different budgets.
+        - Column ``world`` names several worlds.
 
     Examples
     --------

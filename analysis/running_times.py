@@ -459,8 +459,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        - A column is missing, a reward is wrong, a task has several best known rewards, or runs are
-          in different worlds (:func:`.ranking`).
+        - A column is missing, a reward is wrong, a task has several best known rewards, or column
+          ``world`` names several worlds (:func:`.ranking`).
         - ``trials`` is missing or below 1.
         - The reward of a run falls, or a run has two different rewards after the same trials.
         - There are no targets, or a target is not from 0 to 1.

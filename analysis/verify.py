@@ -9,8 +9,6 @@ opens ``FOLDER/runs.sqlite`` and checks that
 - the id, the seed and the labels of each run fit the task, method, parameters and world;
 - the folder has all runs that the plan asks for.
 
-Other columns, such as times, are not checked.
-
 The rules (Shah, Barto & Fagg 2013, *A Dual Process Account of Coarticulation in Motor Skill
 Acquisition*):
 
@@ -26,8 +24,7 @@ Acquisition*):
   made if the goal is not hit yet.
 - A movement of kind *path* leads through waypoints. It stops on a hit, or at the last waypoint.
 - The targets of corrective movements are stored; the corrective process is not run again.
-- With motor noise, only the goals, hands and targets of movements are checked. A run then stores
-  no ticks.
+- With motor noise, only goals, hands and targets are checked. A run then stores no ticks.
 """
 
 from __future__ import annotations
