@@ -21,7 +21,7 @@ from coartic.runs.plan import world_title
 THE_PAPER = "shah2013"
 STATISTICS = "efron1993", "davison1997", "holm1979", "chung2013", "schuirmann1987", "cohen1988"
 THEORIES = "harris1998", "todorov2002"
-"""Keys of works on theories of motor control, with which the documentation compares the methods."""
+"""Keys of works on theories of motor control. The documentation compares methods with them."""
 
 
 @cache
@@ -42,15 +42,16 @@ def bibliography(
 ) -> str:
     """Return BibTeX entries for the software, the paper, and the works behind the methods.
 
-    There is one entry for each work of ``references.bib``, even if several methods cite it, and an
-    entry for each method from a file that declares a citation as text. A comment line before each
-    entry names the methods that cite the work, or gives another reason, such as ``the paper``.
+    Each cited work of ``references.bib`` has one entry, even if several methods cite it. Each
+    method from a file that declares a citation as text has an entry of its own. A comment line
+    before each entry gives the reasons for it: the methods that cite the work, or a reason such as
+    ``the paper``.
 
     Parameters
     ----------
     methods : mapping of str to MethodInfo
-        Maps the id of each method to its declaration. If a method from a file declares no citation
-        and no works, or works that are not in ``references.bib``, a comment line says so.
+        Maps the id of each method to its declaration. A comment line names each method from a file
+        that declares neither a citation nor works, and each work that is not in ``references.bib``.
     analysis : bool
         True to add works on the statistics of the analysis, and works on theories of motor control
         (:data:`STATISTICS`, :data:`THEORIES`).

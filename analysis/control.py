@@ -36,8 +36,8 @@ from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import HANDS, Array
 
 MIN_SHARE = 0.1
-"""A hand sequence is compared with random search only if at least this fraction of the method's
-solved runs on the task have this hand sequence."""
+"""Smallest fraction of a method's solved runs on a task for which a hand sequence is compared with
+random search. Counted are the runs that have this hand sequence and a value of the signature."""
 
 
 def with_control(

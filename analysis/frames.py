@@ -13,8 +13,8 @@ each run, and the columns
 Gaps, shares and rankings are computed from the *value* of each run: its reward, or minus its
 ``mean_ticks`` in a world with motor noise (:func:`.run_values`). If you have the costs of an
 ``Objective``, use their negatives as rewards. The functions raise CoarticError for a frame with
-wrong values. Functions with a result for each method also raise CoarticError if the runs are in
-different worlds.
+wrong values. Functions with a result for each method also raise CoarticError if the frame has a
+column ``world`` that names several worlds.
 """
 
 from __future__ import annotations
@@ -312,9 +312,10 @@ def relative_gaps(frame: pd.DataFrame) -> pd.Series:
     Returns
     -------
     Series
-        (best known - reward) / \\|best known\\| as a fraction, with the index of ``frame``: 0.01
-        stands for 1 % more ticks than the best known reward. The gap is NaN if one of the two
-        rewards is NaN.
+        (best known - value) / \\|best known\\| as a fraction, with the index of ``frame``: 0.01
+        stands for 1 % more ticks than the best known reward. The value of a run is its reward, or
+        minus its mean ticks if it has no reward. The gap is NaN if the value or the best known
+        reward is NaN.
 
     Raises
     ------
@@ -322,10 +323,10 @@ def relative_gaps(frame: pd.DataFrame) -> pd.Series:
         - The frame is not a DataFrame, it has no rows, or a column is missing.
         - A value is neither a finite number nor missing (NaN), or a reward is above 0 (rewards are
           negative, costs positive).
-        - Without noise, a reward is above the best known reward.
+        - Without noise, a value is above the best known reward.
         - A best known reward is 0.
         - The frame has a column ``status``, which is ``ok`` for a run without noise and without a
-          reward, or is not ``ok`` for a run with a reward or mean ticks.
+          value, or is not ``ok`` for a run with a value.
 
     Examples
     --------
@@ -354,12 +355,13 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Returns
     -------
     Series
-        (reward - corrective_best) / (best_known - corrective_best) as a fraction, with the index of
-        ``frame``. The share is negative if the corrective process alone is better than the run. It
-        is NaN if one of the three rewards is NaN, or if nothing can be gained. Nothing can be
-        gained if the best known reward is not above ``corrective_best`` or, in a world with noise,
-        if it is above ``corrective_best`` by less than 1 % of the best known reward, on average
-        over the runs with this best known reward.
+        (value - corrective_best) / (best_known - corrective_best) as a fraction, with the index of
+        ``frame``. The value of a run is its reward or minus its mean ticks
+        (:func:`relative_gaps`). The share is negative if the corrective process alone is better
+        than the run. It is NaN if one of the three numbers is NaN, or if nothing can be gained.
+        Nothing can be gained if the best known reward is not above ``corrective_best`` or, in a
+        world with noise, if it is above ``corrective_best`` by less than 1 % of the best known
+        reward, on average over the runs with this best known reward.
 
     Raises
     ------
@@ -460,15 +462,15 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
         - ``share``: mean share of the possible gain, a fraction (:func:`shares`); only if the frame
           has ``corrective_best``.
 
-        Runs in which a reward, gap or share is NaN are left out of the mean of that column. A mean
-        is NaN if no run is left.
+        Each mean leaves out runs without a value in its column. It is NaN if no run is left.
 
     Raises
     ------
     CoarticError
         A column or a name is missing, a reward is wrong (:func:`relative_gaps`, :func:`shares`), a
         task has more than one best known reward or, without noise, more than one
-        ``corrective_best``, a run has two rows (:func:`ranking`), or runs are in different worlds.
+        ``corrective_best``, a run has two rows (:func:`ranking`), or column ``world`` names several
+        worlds.
 
     Examples
     --------
@@ -533,10 +535,10 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
           (:func:`shares`), over the tasks on which something can be gained. It is NaN for a method
           that is not ranked. ``without_gain`` is the number of the tasks counted in column
           ``tasks`` on which no run has a share. Only for a frame with ``corrective_best``.
-        - ``noisy_gap``, ``noisy_gap_low``, ``noisy_gap_high``: mean gap between minus
-          ``noisy_ticks`` and ``best_known``, which is a reward *without* noise, computed like
-          ``gap``. It is NaN for a method that is not ranked, or if a run has no ``noisy_ticks``.
-          Only for a frame with ``noisy_ticks``.
+        - ``noisy_gap``, ``noisy_gap_low``, ``noisy_gap_high``: mean gap of minus ``noisy_ticks``
+          to ``best_known``, computed like ``gap``. Note that ``best_known`` is a reward *without*
+          noise. The gap is NaN for a method that is not ranked, or if a run has no
+          ``noisy_ticks``. Only for a frame with ``noisy_ticks``.
         - ``tasks``: number of tasks with a best known reward on which the method has runs, all of
           them solved.
         - ``runs`` and ``failed``: number of runs, and number of failed runs, on all tasks.
@@ -555,7 +557,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         - A task has more than one best known reward or, without noise, more than one
           ``corrective_best``.
         - A run has two rows.
-        - Methods have different budgets, or runs are in different worlds.
+        - Runs have different budgets.
+        - Column ``world`` names several worlds.
 
     Examples
     --------

@@ -205,7 +205,7 @@ def methods_of(
     Built-in methods come first, in the order of :data:`KNOWN_METHODS`. Methods from files follow,
     in the order of the suite. If two conditions of the learner share a row of the ranking
     (:func:`ranked_as`), the frame contains a further row for both together. Except for the titles,
-    the columns of this row are those of the second condition.
+    the columns of this row are those of the condition for two arms.
 
     Parameters
     ----------

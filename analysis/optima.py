@@ -1,4 +1,4 @@
-"""Find the best known reward of each task and its proven bound.
+"""Find the best known reward of each task, and the proven bound of this reward.
 
 Gaps are measured from the best known rewards.
 """

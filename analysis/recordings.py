@@ -2,8 +2,8 @@
 
 A recording is a table with a row for each hit of a goal. For a table with a missing column or a
 wrong value, the functions raise CoarticError. The message names the column and, for a wrong value,
-the first row that has one. :func:`consistency` returns two numbers for each hit: how far the hand
-is from the goal, and how slow the movement is compared with the model's.
+the first row that has one. :func:`consistency` computes, for each hit, how far the hand is from the
+goal, and how slow the movement is compared with a movement of the model.
 """
 
 from __future__ import annotations
@@ -134,15 +134,16 @@ def consistency(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each hit, with columns ``subject``, ``trial``, ``goal``, ``hand`` and
+        A row for each hit, in the order of :func:`check_hits`, with columns ``subject``, ``trial``,
+        ``goal``, ``hand`` and
 
         - ``x``, ``y``: the position of the hand in length units, computed from the posture by
           forward kinematics;
         - ``off``: the distance between the hand and the centre of the goal, in radii of the goal;
-        - ``pace``: the recorded ticks of the movement, divided by the ticks of a straight movement
-          of the model (not rounded, at least 1). Both movements go from the posture at the previous
-          hit, or at the start of the task, to the posture at this hit. ``pace`` is NaN if the row
-          of the previous hit is missing.
+        - ``pace``: the recorded ticks of the movement, divided by the number of steps of a straight
+          movement in the paper's model (not rounded, at least 1). Both movements go from the
+          posture at the previous hit, or at the start of the task, to the posture at this hit.
+          ``pace`` is NaN if the row of the previous hit is missing.
 
     Raises
     ------

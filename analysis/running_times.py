@@ -270,9 +270,8 @@ def times_of(
 
     Notes
     -----
-    - A run without stored rewards of trials reaches all targets up to the reward of its solution at
-      its end. If the cost is the number of trials, this running time is 0 for a method that makes
-      no trials.
+    - A run without stored rewards of trials reaches all targets up to the reward of its solution
+      when the run ends. If the method makes no trials, the number of trials is then 0.
     - Forward-kinematics evaluations and wall time (:func:`solve_times`) are only known for a whole
       run. They are spread evenly over its trials, which is not exact: the first trials can take
       several times as many evaluations as the average trial.
@@ -352,9 +351,10 @@ def runtimes(
 ) -> pd.DataFrame:
     """Return the share of targets that each method reaches within a budget: its ECDF.
 
-    The tasks are those whose best known reward is above the reward of the corrective process alone.
-    Methods without a run on one of these tasks, and searches for the optimum, are left out. A
-    failed run reaches no target. All tasks have the same weight.
+    The tasks are those whose best known reward is above the reward of the corrective process alone,
+    and on which a method other than a search for the optimum was run. Methods without a run on one
+    of these tasks, and searches for the optimum, are left out. A failed run reaches no target. All
+    tasks have the same weight.
 
     Parameters
     ----------
@@ -380,14 +380,15 @@ def runtimes(
           over tasks.
 
         A method that reaches no target has one row for each cost, with share 0 and an infinite
-        budget. A method whose cost is unknown for all runs on a task has no rows for this cost.
+        budget. A solved run whose cost is unknown is left out (:func:`times_of`); if no run of a
+        method is left on a task, the method has no rows for this cost.
 
     Raises
     ------
     CoarticError
         - The folder is not a results folder, or runs of its suite are missing.
         - It has runs in several worlds, or in a world with noise.
-        - A target is not above 0 and up to 1.
+        - There are no targets, or a target is not above 0 and up to 1.
         - No task has a best known reward above the reward of the corrective process alone.
     """
     study = results if isinstance(results, Study) else load(results)
@@ -427,7 +428,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     Parameters
     ----------
     frame : DataFrame
-        A row for each improvement of a run (or only a row for its end), with the columns
+        A row for each improvement of a run, or only one row for the end of the run, with the
+        columns
 
         - ``method``, ``task`` and ``run``: names of the method and of the task, and name or number
           of the run. If there is a column ``setting``, each setting of a method is treated as a
@@ -457,8 +459,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        - A column is missing, a reward is wrong, a task has several best known rewards, or runs are
-          in different worlds (:func:`.ranking`).
+        - A column is missing, a reward is wrong, a task has several best known rewards, or column
+          ``world`` names several worlds (:func:`.ranking`).
         - ``trials`` is missing or below 1.
         - The reward of a run falls, or a run has two different rewards after the same trials.
         - There are no targets, or a target is not from 0 to 1.

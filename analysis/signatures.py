@@ -343,10 +343,11 @@ class Signature:
 def hand(runs: Solutions) -> Array:
     """Return the share of goals that each run hits with a slower hand, shape ``(n,)``.
 
-    The chosen hand is slower if the corrective process would reach this goal, on its own, in fewer
-    ticks with another hand, or would not reach it with the chosen hand. For run i, the share is 1
-    minus the mean of a(i, g) over the goals g < G (:func:`as_in_isolation`), a fraction. The last
-    goal is left out. The share is NaN on a task for one hand, and on a task with one goal.
+    The chosen hand counts as slower if the corrective process, from the posture at the previous
+    goal, needs fewer ticks with another hand, or does not reach the goal with the chosen hand. For
+    run i, the share is 1 minus the mean of a(i, g) over the goals g < G (:func:`as_in_isolation`),
+    a fraction. The last goal is left out. The share is NaN on a task for one hand, and on a task
+    with one goal.
     """
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
@@ -791,7 +792,7 @@ def lean(
     the lean is smaller by about 11 % with four equally noisy coordinates, and by 14 % with six. If
     ‖n_A − n_B‖ is larger, the lean is smaller by less.
 
-    All numbers except ``apart`` are NaN if the lean is not applicable, that is, if
+    The leans and the interval are NaN if the lean is not applicable, that is, if
 
     - ‖n_A − n_B‖ is below :data:`NEXT_APART` in the given coordinates;
     - ‖n_A − n_B‖ is below three standard errors. The standard error is the square root of the sum,
@@ -808,7 +809,8 @@ def lean(
         Generator of the bootstrap samples.
     toward : array_like, shape (m, k), optional
         Values of n_A − n_B from m other sources, such as other people. If this is passed, the mean
-        of these values replaces n_A − n_B, and p_A and p_B are means over all runs.
+        of these values, with its standard error, replaces n_A − n_B, and p_A and p_B are means over
+        all runs.
     deterministic : bool
         True if all runs of a context are equal by construction, so that one run is enough.
     resamples : int
@@ -1147,8 +1149,8 @@ class TwoContexts:
         """True if each context has at least one run that hits ``goal`` with ``hand``.
 
         If it is False, :attr:`p` and :attr:`p_same` are NaN, and :attr:`posture_difference`,
-        :attr:`difference`, :attr:`standardised_posture_difference` and :attr:`lean` raise
-        ValueError.
+        :attr:`difference`, :attr:`standardised_posture_difference`, :attr:`parts` and :attr:`lean`
+        raise ValueError.
         """
         return all(map(len, self.configurations))
 
@@ -1250,7 +1252,7 @@ class TwoContexts:
 
     @cached_property
     def p_same(self) -> float:
-        """p-value of the bootstrap test of whether the posture difference is below :data:`SAME`.
+        """p-value of the bootstrap test for a posture difference below :data:`SAME`.
 
         The test is :func:`.posture_difference_below`. The p-value is NaN if a context has fewer
         than five compared runs.

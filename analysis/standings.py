@@ -1,8 +1,8 @@
 """Rank the methods of a study, and say why some methods are not ranked.
 
 A method is ranked if it has runs on all tasks of the ranking, if all these runs are solved, and if
-it was asked for the same number of trials as the other methods (:func:`ranking_budget`). Searches
-for the optimum are references and are not ranked.
+it was not asked for another number of trials than that of the ranking (:func:`ranking_budget`).
+Searches for the optimum are references and are not ranked.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from coartic.runs.record import NOISE_RULE
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
-    """Return the name of the best known rewards of tasks in sentences, such as ``optimum``.
+    """Return what sentences call the best known rewards of tasks, such as ``optimum``.
 
     A reward is called *local* if it is not proven to be the optimum, and is known only from methods
     of this folder (:attr:`.BestKnown.only_here`). The name is
@@ -138,8 +138,8 @@ def standings(study: Study) -> pd.DataFrame:
 
     A method is ranked if it has runs on all tasks of :func:`ranked_tasks`, if all these runs are
     solved, and if it was asked for the number of trials of :func:`ranking_budget`. The number of
-    trials does not matter for a method without trials, or if :func:`ranking_budget` returns None. A
-    method that solved all runs with another number of trials has a gap, but is not ranked.
+    trials does not matter for a method without trials, or if :func:`ranking_budget` returns None.
+    If another number of trials is the only reason why a method is not ranked, the method has a gap.
 
     Returns
     -------
@@ -150,8 +150,8 @@ def standings(study: Study) -> pd.DataFrame:
         why a method is not ranked; it is empty for a ranked method. Column ``note`` says, if it
         applies,
 
-        - how many trials the solved runs of a method from a file made, if this number differs from
-          the number that was asked for;
+        - how many trials the solved runs of a method from a file made, if the method uses the
+          reward of each trial, and this number differs from the number that was asked for;
         - how many of a method's solutions, found in the paper's world, can fail with motor noise;
         - how many executions failed in a world with noise.
 

@@ -109,8 +109,9 @@ def bootstrap_test(
     Raises
     ------
     ValueError
-        ``values`` is empty or not a vector, or a number cannot be used: ``bound`` or one of the
-        values is NaN, infinite, above 1e100 in size, or below 1e-100 in size but not 0.
+        ``values`` is empty or not a vector of real numbers, or a number cannot be used: ``bound``
+        or one of the values is NaN, infinite, above 1e100 in size, or below 1e-100 in size but not
+        0.
 
     Examples
     --------
@@ -171,8 +172,8 @@ def exchange_test(
     Raises
     ------
     ValueError
-        A sample is empty or not a vector, or one of the values is NaN, infinite, above 1e100 in
-        size, or below 1e-100 in size but not 0.
+        A sample is empty or not a vector of real numbers, or one of the values is NaN, infinite,
+        above 1e100 in size, or below 1e-100 in size but not 0.
 
     Examples
     --------
@@ -196,9 +197,9 @@ def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool =
     Parameters
     ----------
     n, m : int
-        Numbers of values in the two samples, at least 2.
+        Numbers of values in the two samples, at least five.
     resamples : int
-        Number of random permutations. They are used if there are more than ``resamples`` ways to
+        Number of random permutations, which are used if there are more than ``resamples`` ways to
         divide the values.
     two_tailed : bool
         True for the two-sided test. If both samples have the same size, swapping them gives a
@@ -509,7 +510,8 @@ def task_mean(values: Iterable[ArrayLike]) -> Estimate:
     Raises
     ------
     ValueError
-        There are no tasks, a task has no runs, or a score is NaN or infinite.
+        There are no tasks, or the scores of a task cannot be used (:func:`.vector`), for example
+        because one of them is NaN.
     """
     strata = [*map(vector, values)]
     return mean_of_means(strata, [1 / len(strata) for _ in strata])
@@ -535,8 +537,8 @@ def other_tasks(scores: Scores) -> Estimate:
     Raises
     ------
     ValueError
-        There is no family, a family has no instances, an instance has no runs, or a score is NaN or
-        infinite.
+        There is no family, a family has no instances, or the scores on an instance cannot be used
+        (:func:`.vector`), for example because one of them is NaN.
 
     Examples
     --------

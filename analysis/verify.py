@@ -5,8 +5,8 @@ opens ``FOLDER/runs.sqlite`` and checks that
 
 - the solution of each run (and the first trial and the replay of a learner) obeys the rules, hits
   all goals, and has the stored ticks, reward and hands;
-- no joint angle and no reward of a trial was changed after the run, which a stored hash shows;
-- the id, the seed and the labels of each run are those of its task, method, parameters and world;
+- the stored hash of each run is that of its movements and of the rewards of its trials;
+- the id, the seed and the labels of each run fit the task, method, parameters and world;
 - the folder has all runs that the plan asks for.
 
 The rules (Shah, Barto & Fagg 2013, *A Dual Process Account of Coarticulation in Motor Skill

@@ -32,7 +32,7 @@ _LATEX = str.maketrans(
     }
 )
 """Translation table for ``str.translate``. It maps special characters of LaTeX and BibTeX, and
-symbols that coartic itself writes, to LaTeX commands."""
+some symbols that coartic itself writes, to LaTeX commands."""
 
 
 def id_of(function: Callable[..., Any]) -> str:
@@ -57,7 +57,7 @@ def number(value: float, digits: _Digits | None = None) -> str:
         - An integer has no decimals.
         - Any other number whose size is below 0.0001 has two significant figures and an exponent,
           as in ``1.2e−05``.
-        - All other numbers have three significant figures, or no decimals from 100 on.
+        - All other numbers have about three significant figures, or no decimals from 100 on.
 
     Returns
     -------
@@ -222,8 +222,9 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
     """Return a dict that maps each name to a unique slug for file names.
 
     A slug consists of the lower-case letters a to z, digits and dashes. It has at most 80
-    characters, before a number. If two names would have the same slug, such as ``a-b``, a number is
-    added to the second slug: ``a-b-2``. A name without such letters and digits gets the slug ``x``.
+    characters, to which a number can be added: if two names would have the same slug, such as
+    ``a-b``, the second one gets ``a-b-2``. The slug of a name without ASCII letters and digits
+    begins with ``x``.
     """
     slug_of: dict[str, str] = {}
     for name in names:
