@@ -716,10 +716,11 @@ class Optimiser(Method):
     Parameters = OptimiserParameters
 
     def solve(self, session: Session) -> Result:
-        """Call :meth:`optimise` until it returns or no trial is left; return the best trial.
+        """Minimise the cost by :meth:`optimise`, and return the movements of the best trial.
 
-        With motor noise, return instead the movements of the point that :meth:`optimise`
-        recommends, if it recommends one.
+        :meth:`optimise` is called once. It ends when it returns, or when it asks for a trial and
+        none is left. With motor noise, the movements of the point that it recommends are returned
+        instead, if it recommends one.
 
         Raises
         ------
