@@ -23,8 +23,8 @@ makes one trial with only the corrective process. If that trial succeeds, each l
 sequence makes one generation of the strategy of this sequence.
 
 With motor noise the reward of the best trial is partly luck, so the targets of the solution are the
-mean of a strategy. There is a candidate for each hand sequence and each restart of its strategy:
-the last mean of the strategy. The solution is the candidate whose last complete generation has the
+mean of a strategy. Each start and each restart of a strategy gives a candidate: the mean after its
+last complete generation. The solution is the candidate whose last complete generation has the
 lowest mean cost. In this mean cost, the cost of a failed trial is the larger of two numbers: twice
 the ticks of the first trial with this hand sequence (in which only the corrective process acts),
 and 1 tick more than the worst completed trial of the generation.

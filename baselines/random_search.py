@@ -44,7 +44,8 @@ class RandomSearchHandsParameters(Parameters):
     """Parameters of random search over all hand sequences."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Number of trials of a run, including those in which only the corrective process acts."""
+    """Largest number of trials of a run, including those in which only the corrective process
+    acts."""
     sigma: Annotated[float, Field(gt=0, le=MAX_NOISE)] = 0.05
     """Standard deviation of the noise on each explored joint, in length units (base) and rad
     (joints). The default is the learner's."""
