@@ -5,8 +5,8 @@ cascade (:mod:`coartic.baselines.cascade`) computes each control step: level 1 m
 level 2 chooses among the joint changes that move the hand in this way.
 
 Best-first search over prefixes of hand sequences finds the hand sequence with the fewest ticks. The
-key of the priority queue is the number of ticks of a prefix, so that the prefix with the fewest
-ticks is extended by the next goal.
+key of the priority queue is the number of ticks of a prefix: the prefix with the fewest ticks is
+extended next.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ With ``stages`` above 1 the trials are divided into equal parts. After each part
 noise moves to the best trial so far. Parameter ``keep`` decides whether the new centre consists of
 the postures that the best trial reached, or of its targets.
 
-``random-search`` uses the hands of its parameter or, by default, the hands with which the
+``random-search`` uses the hands of parameter ``hands`` or, by default, the hands with which the
 corrective process on its own gets the highest reward. ``random-search/hands`` divides its trials
 equally among all hand sequences. Its solution is the best trial over all sequences.
 """

@@ -201,8 +201,9 @@ class Method(ABC):
     def refuses(cls, model: MotionModel) -> str | None:
         """Return a sentence on why the method cannot run under a motion model, or None.
 
-        The sentence names the first constant that differs from the paper's and to which the method
-        does not adapt (:attr:`adapts_to`).
+        The sentence names the first constant in :data:`.WORLD` that differs from the paper's and to
+        which the method does not adapt (:attr:`adapts_to`). Other constants of the motion model are
+        not looked at.
         """
         adapts_to = cls.adapts_to
         if adapts_to is None:
@@ -311,7 +312,7 @@ def run_method(
     """Let a method solve a task in this process.
 
     The session has no trial budget, and the solution is not executed. Methods of this project may
-    see the task itself, and report their own counts. Any other method must work only through its
+    see the task itself, and may add to all counters. Any other method must work only through its
     session. The session raises UndeclaredError if it detects the use of undeclared information
     (:data:`METERED`).
 

@@ -56,7 +56,7 @@ FAILED = 1_000_000
 """Cost, in ticks, of a trial that fails or takes longer than this."""
 HALF_WIDTH = 1.0
 CHUNK = 8192
-"""Number of points that are evaluated at a time, which limits the memory."""
+"""Largest number of points that are evaluated at a time, which limits the memory."""
 NO_COPIES = (
     "an objective cannot be copied or sent to another process, because its trials would not be "
     "counted there: use vectorized=True or objective.many(points) instead of workers"
