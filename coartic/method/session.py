@@ -194,9 +194,8 @@ class Session:
       ``information``. A session is not a sandbox: it cannot keep a method from reading the task
       by other means.
     - Trials and evaluations are counted.
-    - Threads can share a session: they make trials one after the other, from the same budget. Counts
-      that several threads add at the same time outside trials, such as by :meth:`spend`, can be
-      lost.
+    - Threads can share a session: they make trials one after the other, from the same budget. Other
+      counts, such as those of :meth:`spend`, can be lost if threads add to them at the same time.
     - In a forked process, a call that needs declared information raises CoarticError.
 
     Parameters
