@@ -99,7 +99,7 @@ def solve_by_bandit(
     make_search: Callable[[Attempts, str], Search],
     exploration: float,
 ) -> Result:
-    """Try each hand sequence once, then divide the remaining trials among them by UCB1.
+    """Try each hand sequence once, then divide the remaining trials among the sequences by UCB1.
 
     1. For each hand sequence, ``make_search`` makes a search, which makes one trial in which only
        the corrective process acts. If this trial fails, the hand sequence gets no further trials.
@@ -130,7 +130,7 @@ def solve_by_bandit(
     Result
         The movements of the best trial; with motor noise, the movements to the recommended targets
         (:func:`recommend`). The details contain ``best_trial``, the number of the best trial from
-        0, and ``trials``, a dict that maps each hand sequence to its number of trials.
+        0, and ``trials``, a dict that maps each tried hand sequence to its number of trials.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: fl
     - c is ``exploration`` times the difference between the highest and the lowest first reward of
       the searches, or ``exploration`` times 1 tick if this difference is below 1 tick.
 
-    Searches whose first trial failed do not take part.
+    Searches whose first trial failed do not take part, and are left out of N and c.
 
     Parameters
     ----------

@@ -14,17 +14,17 @@ sequences, the method uses only the task's initial sequence. Then UCB1 chooses t
 makes the next generation of trials; the value of a strategy is the best reward of its sequence so
 far. The exploration bonus of UCB1 is scaled by the range of the rewards of the first trials.
 
-``cma-es/goal-by-goal`` keeps a value table keyed by goal, hand at the goal before, and hand at this
-goal. The value of an entry is the best reward of all hand sequences tried so far that have these
-two hands at these two goals. The first sequence is the task's initial one. Each later sequence is
-chosen goal by goal, from the first goal to the last: at each goal, the hand with the higher value
-or, with probability ε, a random hand. When a sequence is chosen for the first time, the method
-makes one trial with only the corrective process. If that trial succeeds, each later choice of the
-sequence makes one generation of the strategy of this sequence.
+``cma-es/goal-by-goal`` keeps a value table keyed by goal, hand at the previous goal, and hand at
+this goal. The value of an entry is the best reward of all hand sequences tried so far that have
+these two hands at these two goals. The first sequence is the task's initial one. Each later
+sequence is chosen goal by goal, from the first goal to the last: at each goal, the hand with the
+higher value or, with probability ε, a random hand. When a sequence is chosen for the first time,
+the method makes one trial with only the corrective process. If that trial succeeds, each later
+choice of the sequence makes one generation of the strategy of this sequence.
 
 With motor noise the reward of the best trial is partly luck, so the targets of the solution are the
-mean of a strategy. There is a candidate for each hand sequence and each restart of its strategy:
-the last mean of the strategy. The solution is the candidate whose last complete generation has the
+mean of a strategy. Each start and each restart of a strategy gives a candidate: the mean after its
+last complete generation. The solution is the candidate whose last complete generation has the
 lowest mean cost. In this mean cost, the cost of a failed trial is the larger of two numbers: twice
 the ticks of the first trial with this hand sequence (in which only the corrective process acts),
 and 1 tick more than the worst completed trial of the generation.

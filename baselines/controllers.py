@@ -5,8 +5,8 @@ cascade (:mod:`coartic.baselines.cascade`) computes each control step: level 1 m
 level 2 chooses among the joint changes that move the hand in this way.
 
 Best-first search over prefixes of hand sequences finds the hand sequence with the fewest ticks. The
-key of the priority queue is the number of ticks of a prefix, so that the prefix with the fewest
-ticks is extended by the next goal.
+key of the priority queue is the number of ticks of a prefix: the prefix with the fewest ticks is
+extended next.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Aim(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A simulated movement to a goal, which begins at the end of the leg before.
+    """A simulated movement to a goal, which begins at the end of the previous leg.
 
     The first leg begins at the start of the task.
     """
@@ -106,7 +106,7 @@ class Controller(ABC):
         aims : tuple of Aim
             Goal and hand of the leg, then the goals ahead with their hands.
         memory : object
-            Memory at the end of the leg before; None for the first leg.
+            Memory at the end of the previous leg; None for the first leg.
         """
 
     @abstractmethod
@@ -143,8 +143,8 @@ class Controller(ABC):
         Parameters
         ----------
         before : Leg or None
-            The leg before. The simulation begins at the end of that leg; for None it begins at the
-            start of the task.
+            The previous leg. The simulation begins at the end of that leg; for None it begins at
+            the start of the task.
         aims : tuple of Aim
             Goal and hand of the leg, then the goals ahead with their hands.
 

@@ -63,8 +63,8 @@ class HillClimbingParameters(SequenceParameters):
 
     - ``"correction"``: there are none; only **A** acts.
     - ``"best"``: similar to the learner's table. If the sequence and the best sequence so far have
-      the same hand at a goal and the same hand at the goal before, the target for this goal is the
-      centre of the best sequence plus noise. At all other goals **A** acts. Until a trial has
+      the same hand at a goal and the same hand at the previous goal, the target for this goal is
+      the centre of the best sequence plus noise. At all other goals **A** acts. Until a trial has
       succeeded, **A** acts at all goals.
     """
     spread: Literal["fixed", "learned"] = "fixed"
@@ -93,7 +93,9 @@ class HillClimbing(Method):
         With motor noise, movements to a centre are returned instead: the latest centre of the hand
         sequence that the best trial used. A centre consists of the configurations around which
         trials are drawn. The method stops early if the corrective process has failed with each hand
-        sequence that the method may use (with parameter ``sequence`` there is only one).
+        sequence that the method may use (with parameter ``sequence`` there is only one). The
+        details contain the number of the best trial (``best_trial``, from 0) and the number of hand
+        sequences with a centre (``sequences``).
 
         Raises MethodError if no trial hits every goal, NotApplicableError if no initial hands are
         found, and ValueError if parameter ``sequence`` does not fit the task.

@@ -245,10 +245,10 @@ class InModel(Method):
     def solve(self, session: Session) -> Result:
         """Search from both starts, and return the movements with the fewest mean ticks.
 
-        The details map the name of each start to a dict with three entries: the hand sequence
-        (``hands``), and the mean ticks of the start itself (``start``) and of the best solution
-        that was found from it (``end``). Both means are over the noise draws of the final
-        comparison; without motor noise they are the ticks of one execution.
+        The details map the name of each start that exists to a dict with three entries: the hand
+        sequence (``hands``), the mean ticks of the start itself (``start``), and the mean ticks of
+        the best solution that was found from this start (``end``). Both means are over the noise
+        draws of the final comparison; without motor noise they are the ticks of one execution.
 
         Raises MethodError if neither start exists: ``optimum/search`` finds no path, and
         :func:`.best_hands` finds no hand sequence with which the corrective process completes the

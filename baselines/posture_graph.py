@@ -28,7 +28,8 @@ from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Task
 
 KINEMATICS = frozenset({Information.GOALS, Information.FORWARD_KINEMATICS, Information.JACOBIAN})
-"""Information on goals and positions of hands that all planners and controllers use."""
+"""Information that all planners and controllers use: the goals, the positions of hands, and the
+derivatives of these positions."""
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
 """A chain: a hand sequence, and the configurations at the goals, shape ``(G, dof)``."""
@@ -130,8 +131,8 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
     """Sample the nodes of a posture graph for each goal and hand.
 
     A node is a posture in which the hand is inside the goal's disc. Each sample begins with a
-    random configuration, from which Gauss-Newton steps move the hand into the disc. If the goal
-    before has nodes, of either hand, half of the random configurations are drawn around these
+    random configuration, from which Gauss-Newton steps move the hand into the disc. If the previous
+    goal has nodes, of either hand, half of the random configurations are drawn around these
     nodes. All other random configurations are drawn around the task's start.
 
     Parameters

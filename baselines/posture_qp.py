@@ -40,8 +40,8 @@ of a prototype. Three numbers were varied, one at a time:
 - *Least speed.* Lower bound on the speed with which the hand comes nearer to the goal, as a
   fraction of a constant speed: that with which the hand would arrive after as many control steps as
   the joints need for the straight line to the posture.
-- *Weight of the next segment.* Each posture minimises a weighted sum of the lengths of two segments
-  of the path. The segment from the posture before (or from the robot's configuration) to the
+- *Weight of the next segment.* Each posture minimises a weighted sum of the lengths of two path
+  segments. The segment from the posture before (or from the robot's configuration) to the
   posture has weight 1, and the segment from the posture to the next posture has this weight.
 - *Goals ahead.* Number of goals after the current goal whose postures are part of the path.
 

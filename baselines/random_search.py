@@ -14,7 +14,7 @@ With ``stages`` above 1 the trials are divided into equal parts. After each part
 noise moves to the best trial so far. Parameter ``keep`` decides whether the new centre consists of
 the postures that the best trial reached, or of its targets.
 
-``random-search`` uses the hands of its parameter or, by default, the hands with which the
+``random-search`` uses the hands of parameter ``hands`` or, by default, the hands with which the
 corrective process on its own gets the highest reward. ``random-search/hands`` divides its trials
 equally among all hand sequences. Its solution is the best trial over all sequences.
 """
@@ -44,7 +44,8 @@ class RandomSearchHandsParameters(Parameters):
     """Parameters of random search over all hand sequences."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Number of trials of a run, including those in which only the corrective process acts."""
+    """Largest number of trials of a run, including those in which only the corrective process
+    acts."""
     sigma: Annotated[float, Field(gt=0, le=MAX_NOISE)] = 0.05
     """Standard deviation of the noise on each explored joint, in length units (base) and rad
     (joints). The default is the learner's."""

@@ -90,7 +90,7 @@ class RecedingHorizon(Method):
         The details contain the length of the path before rounding (``path_length``, in a mix of
         length units and rad), the number of windows (``windows``), the number of starts of IPOPT
         (``solves``), and how many of them did not converge (``failed_solves``). Raises MethodError
-        if no path through a window is found.
+        if no path through a window is found, or if none can be rounded to whole ticks.
         """
         task, parameters = session.reveal(*self.information), self.parameters
         exact = session.model.without_noise()

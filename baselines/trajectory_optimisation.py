@@ -164,7 +164,8 @@ class TrajectoryOptimisation(Method):
           length units and rad (the path itself is longer if it is curved);
         - ``costs``: dict that maps each hand sequence with a converged plan to the cost of the
           plan;
-        - ``failed``: dict that maps each other hand sequence to the status that IPOPT returned.
+        - ``failed``: dict that maps each other planned hand sequence to the status that IPOPT
+          returned from its last start.
 
         Raises MethodError if IPOPT converges for no hand sequence, if a goal has no posture in a
         graph, or if both the rounding and the solve with targets inside the discs fail.
@@ -361,10 +362,10 @@ def path_movements(
 ) -> tuple[Movement, ...]:
     """Divide a path into movements of kind ``path``, one for each goal.
 
-    A movement ends where the hand enters its goal, usually before the end of the piece of the path
-    that leads to this goal. The next movement therefore begins with the remaining waypoints of that
-    piece. At all waypoints of a movement, the joints that ``instance`` holds during this movement
-    have the values of the start of the movement. A movement that misses its goal is returned, too.
+    A movement ends where the hand enters the goal, usually before the piece of the path to this
+    goal ends. The next movement therefore begins with the remaining waypoints of that piece. At all
+    waypoints of a movement, the joints that ``instance`` holds during this movement have the values
+    of the start of the movement. A movement that misses its goal is returned, too.
 
     Parameters
     ----------
@@ -375,7 +376,7 @@ def path_movements(
         Hands and held joints.
     path : list of ndarray, shape (k, dof)
         A piece of the path for each goal, in length units and rad. A piece does not include the
-        last configuration of the piece before it.
+        last configuration of the previous piece.
 
     Returns
     -------

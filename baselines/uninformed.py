@@ -27,7 +27,7 @@ class UninformedParameters(Parameters):
     """Parameters of CMA-ES, hill climbing and policy gradient, with the learner's defaults."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Number of trials of a run."""
+    """Largest number of trials of a run."""
     sigma: Annotated[float, Field(gt=0, le=10)] = 0.05
     """Standard deviation of the noise on the targets, in length units (base) and rad (joints).
     CMA-ES, and policy gradient and hill climbing with ``spread="learned"``, begin with this value
@@ -53,12 +53,15 @@ class SequenceParameters(UninformedParameters):
 class Attempts:
     """Make the physical trials of one run, and remember the best trial.
 
+    The session enforces its own budget, but nothing enforces ``trials``: callers ask for at most
+    ``left`` trials.
+
     Parameters
     ----------
     session : Session
         Session in which the trials are made and counted.
     trials : int
-        Largest number of trials.
+        Number of trials of the run, from which ``left`` is computed.
     """
 
     def __init__(self, session: Session, trials: int) -> None:
@@ -97,8 +100,8 @@ class Attempts:
         Returns
         -------
         Trials
-            Results of the trials, in order. If the budget ends, there are fewer trials than hand
-            sequences.
+            Results of the trials, in order. If the session's budget ends, there are fewer trials
+            than hand sequences.
 
         Raises
         ------
@@ -122,7 +125,8 @@ class Attempts:
         Returns
         -------
         Trials
-            Results of the trials, in order. If the budget ends, there are fewer than N trials.
+            Results of the trials, in order. If the session's budget ends, there are fewer than N
+            trials.
 
         Raises
         ------
@@ -146,12 +150,13 @@ class Attempts:
             Targets, in length units and rad; NaN for joints that do not move. N is at least 1.
         until : ndarray, shape (N,), optional
             Threshold of the reward for each trial. The first trial whose reward exceeds the
-            threshold for this trial is the last trial that is made.
+            threshold for this trial is the last trial that is counted.
 
         Returns
         -------
         Trials
-            Results of the trials made, in order. If the budget ends, there are fewer than N trials.
+            Results of the counted trials, in order. There are fewer than N trials if the session's
+            budget ends, or if a reward exceeds its threshold.
 
         Raises
         ------

@@ -78,7 +78,7 @@ class Rounding:
         return self.divide(plan, [round(length) for length in exact], ())
 
     def iter_roundings(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
-        """Yield the 64 nearest roundings of a plan to whole steps.
+        """Yield roundings of a plan to whole steps, at most the 64 nearest.
 
         The nearest rounding comes first. Each segment except the last is rounded up or down; the
         last segment is rounded up. The distance of a rounding from the plan is the sum, over all
@@ -237,8 +237,8 @@ def movements(
 ) -> tuple[Movement, ...]:
     """Return the movements of a plan, one for each goal.
 
-    A joint that ``instance`` holds on the way to a goal keeps the value that it has at the end of
-    the movement before, even if that movement ended before its target.
+    A joint that ``instance`` holds on the way to a goal keeps its value from the end of the
+    previous movement, even if that movement ended before it reached its target.
 
     Parameters
     ----------

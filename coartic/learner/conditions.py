@@ -8,12 +8,14 @@ A condition defines
 
 *Informed conditions* combine informed and uninformed search, which the paper leaves to "future
 research" (section *Integrating Informed and Uninformed Search*). They use null-space projection to
-move the base and the chosen arm towards a preferred posture, in two places. First, the mean of
-exploration, which in the paper is the stored target t, becomes ::
+move the base and the chosen arm towards a preferred posture, in one or two places. With gain κ
+(field ``drift``) above 0, the mean of exploration, which in the paper is the stored target t,
+becomes ::
 
     t + κ N(t) (p - t)
 
-Second, each iteration of the corrective process adds to its configuration x the term ::
+With gain β (field ``pull``) above 0, each iteration of the corrective process adds to the
+configuration x the term ::
 
     β N(x) (p - x)
 
@@ -23,11 +25,12 @@ Here
 - N = I − J⁺J is the projection onto the null space of the Jacobian J of the chosen hand. Like the
   paper's distance in joint space, the projection mixes lengths and angles.
 
-Two *ablations*, which are not in the paper, each change one part of the learner:
+There are two *ablations*, which are not in the paper:
 
 - *uncorrected*: a movement to a stored target that misses its goal is not corrected;
 - *subtask*: the learner learns from the reward of each subtask, that is, of the movements to one
-  goal. The paper calls it crucial that the learner learns from the overall reward.
+  goal, and its solution is a greedy trial after learning. The paper calls it crucial that the
+  learner learns from the overall reward.
 """
 
 from __future__ import annotations
@@ -89,8 +92,8 @@ Drifts = Annotated[
 class ExplorationCondition:
     """Rules of the learner's exploration and learning (paper, section *Experiments*).
 
-    ``CONDITIONS`` contains the paper's four conditions, ``ABLATIONS`` contains conditions that
-    change one part of the learner, and ``INFORMED`` contains conditions that use more information.
+    ``CONDITIONS`` contains the paper's four conditions, ``ABLATIONS`` contains ablations of EC1 and
+    EC4, and ``INFORMED`` contains conditions that use more information.
     To change fields of a condition, use ``dataclasses.replace``. Raises ValueError if a field is
     out of range, or if two fields contradict each other.
 
@@ -109,8 +112,8 @@ class ExplorationCondition:
     """True if noise is added to the targets of the base (its coordinates that are not locked) and
     of the chosen arm, whose hand is to hit the goal (AModChosen)."""
     modify_other: bool
-    """True if noise is added to the targets of the other arm (AModOther). If False, the other arm
-    does not move."""
+    """True if noise is added to the targets of the other arm (AModOther). If False, movements to
+    stored targets do not move the other arm."""
     hand_exploration: Literal["none", "closest", "random", "nearest-posture"]
     """Which hand is tried for a goal when the hand is explored, which happens with probability
     ``epsilon``:
@@ -137,9 +140,9 @@ class ExplorationCondition:
     R of the whole trial (``"overall"``), or the return of the goal (``"subtask"``; ``discount``
     defines the return)."""
     discount: Share = 0.0
-    """Discount factor γ. The return of goal g is Σ γ^|h − g| r_h, where r_h is the reward of the
-    movements to goal h. With γ = 0 the return is r_g, the reward of the subtask itself. A value
-    above 0 needs credit ``"subtask"``.
+    """Discount factor γ. The return of goal g is the sum of γ^|h − g| r_h over goals h
+    (``counted``), where r_h is the reward of the movements to goal h. With γ = 0 the return is r_g,
+    the reward of the subtask itself. A value above 0 needs credit ``"subtask"``.
     """
     counted: Literal["later", "all"] = "later"
     """Goals h over which the return of goal g is summed: g and all later goals (``"later"``), or

@@ -22,8 +22,8 @@ own NumPy generator (``default_rng(seed)``, PCG64), in this order:
    uniform number that is compared with ε;
 3. at the same goal, if that number is below ε and a hand is chosen at random: a uniform number that
    chooses the hand;
-4. at the same goal, if a target is stored: a standard normal number for each explored joint, in the
-   order of ``q``.
+4. at the same goal, if a target is stored: a standard normal number for each explored entry of the
+   configuration, in the order of ``q``.
 
 Runs share no data, so that the result of a run depends neither on the other runs nor on their
 number. Motor noise does not come from this generator (:mod:`coartic.motion.kernels.noise`).
@@ -451,8 +451,8 @@ def make_trial(
     A trial ends at the first goal that is missed. This function fills the per-goal records
     ``records``, shape ``(N, G)``, and the counts in ``workspace``. In trial 0, the hands and
     targets are those in ``learner``. If ``explore`` is False, the trial is greedy: without
-    null-space exploration (κ) and without exploration noise. Other arguments are as in
-    :func:`learn_kernel`.
+    exploration of hands, null-space exploration (κ) and exploration noise. Other arguments are as
+    in :func:`learn_kernel`.
     """
     batch, counts, runs, initial = workspace.batch, workspace.counts, len(tables), trial == 0
     for n in range(runs):
@@ -567,13 +567,13 @@ def learn_kernel(
 ) -> None:
     """Make all trials of N runs, then the replay of each run.
 
-    The replay is a greedy trial without exploration noise. If ``results`` has room for 0 trials,
+    The replay is a greedy trial without exploration. If ``results`` has room for 0 trials,
     trial 0 takes the place of the replay.
 
     Parameters
     ----------
     robot
-        From :func:`robot_parameters`.
+        From :func:`.robot_parameters`.
     learner
         From :func:`learner_parameters`.
     tables
@@ -581,7 +581,7 @@ def learn_kernel(
     results
         :class:`Results` of zeros with ``best_trial`` -1, filled in place.
     rngs
-        The runs' own generators (:func:`addresses`).
+        The runs' own generators (:func:`.addresses`).
     seeds
         Seed of the motor noise of each run (:func:`.noise_seed`), shape ``(N,)``. Trial k is made
         with noise draw k. The replay is made with the draw after that of the last trial.

@@ -168,7 +168,8 @@ def learn_many(
     start : sequence of Movement
         First solution of every run (:func:`learn`).
     jobs : int
-        Largest number of threads, from 1 to 10,000; -1 stands for the number of cores.
+        Largest number of threads, from 1 to 10,000; -1 stands for the number of cores that the
+        process may use.
 
     Returns
     -------

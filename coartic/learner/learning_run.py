@@ -95,7 +95,7 @@ class LearningRun:
     def next_action(self) -> tuple[Movement, ...]:
         """Movements that the learner would make in a next trial without exploration.
 
-        The state at a goal is the pair of this goal and the hand for the goal before.
+        The state at a goal is the pair of this goal and the hand for the previous goal.
 
         - *Hand.* The hand for a goal is the one with the highest Q in the state; at a tie the left
           hand.

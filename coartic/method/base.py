@@ -112,7 +112,7 @@ def outline_of(task: Task) -> Outline:
 class Facts:
     """Citations and names of a method for figures, tables and the bibliography.
 
-    Raises ValueError if a field has a wrong type, or if ``short`` is too long.
+    Raises ValueError if a value does not fit its field, for example if ``short`` is too long.
 
     Examples
     --------
@@ -170,7 +170,8 @@ class Method(ABC):
     - all three constants otherwise.
     """
     stochastic: ClassVar[bool] = True
-    """True if the results depend on the seed. If False, the method is run once on each task."""
+    """True if the results depend on the seed. If False, a suite runs the method once on each task
+    (in each world)."""
     Parameters: ClassVar[type[Parameters]] = Parameters
     """Class of the method's parameters. By default a method has none."""
     version: ClassVar[int] = 1
@@ -200,8 +201,9 @@ class Method(ABC):
     def refuses(cls, model: MotionModel) -> str | None:
         """Return a sentence on why the method cannot run under a motion model, or None.
 
-        The sentence names the first constant that differs from the paper's and is not in
-        :attr:`adapts_to`.
+        The sentence names the first constant in :data:`.WORLD` that differs from the paper's and to
+        which the method does not adapt (:attr:`adapts_to`). Other constants of the motion model are
+        not looked at.
         """
         adapts_to = cls.adapts_to
         if adapts_to is None:
@@ -310,7 +312,7 @@ def run_method(
     """Let a method solve a task in this process.
 
     The session has no trial budget, and the solution is not executed. Methods of this project may
-    see the task itself, and report their own counts. Any other method must work only through its
+    see the task itself, and may add to all counters. Any other method must work only through its
     session. The session raises UndeclaredError if it detects the use of undeclared information
     (:data:`METERED`).
 

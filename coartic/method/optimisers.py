@@ -56,7 +56,7 @@ FAILED = 1_000_000
 """Cost, in ticks, of a trial that fails or takes longer than this."""
 HALF_WIDTH = 1.0
 CHUNK = 8192
-"""Number of points that are evaluated at a time, which limits the memory."""
+"""Largest number of points that are evaluated at a time, which limits the memory."""
 NO_COPIES = (
     "an objective cannot be copied or sent to another process, because its trials would not be "
     "counted there: use vectorized=True or objective.many(points) instead of workers"
@@ -716,10 +716,11 @@ class Optimiser(Method):
     Parameters = OptimiserParameters
 
     def solve(self, session: Session) -> Result:
-        """Call :meth:`optimise` until it returns or no trial is left; return the best trial.
+        """Minimise the cost by :meth:`optimise`, and return the movements of the best trial.
 
-        With motor noise, return instead the movements of the point that :meth:`optimise`
-        recommends, if it recommends one.
+        :meth:`optimise` is called once. It ends when it returns, or when it asks for a trial and
+        none is left. With motor noise, the movements of the point that it recommends are returned
+        instead, if it recommends one.
 
         Raises
         ------

@@ -81,8 +81,8 @@ METERED = frozenset(
         Information.NOISE_DRAWS,
     }
 )
-"""Information whose use a session can detect. Other information is declared, but its use is not
-checked."""
+"""Information whose use a session can detect. Methods declare other information as well, but the
+session does not check its use."""
 
 
 class UndeclaredError(CoarticError):
@@ -128,8 +128,8 @@ class Meter:
     movement_ticks: int = 0
     """Control ticks of all trials, including ``initial_trials``."""
     forward_kinematics: int = 0
-    """Forward-kinematics evaluations, one per configuration. Compiled kernels skip steps that
-    cannot end a movement; these steps are not counted."""
+    """Forward-kinematics evaluations, one for each configuration and hand. Compiled kernels skip
+    steps that cannot end a movement; these steps are not counted."""
     jacobians: int = 0
     """Jacobian evaluations. The corrective process makes one per iteration."""
     corrective_iterations: int = 0
@@ -194,7 +194,8 @@ class Session:
       ``information``. A session is not a sandbox: it cannot keep a method from reading the task
       by other means.
     - Trials and evaluations are counted.
-    - Threads can share a session: they make trials one after the other, from the same budget.
+    - Threads can share a session: they make trials one after the other, from the same budget. Other
+      counts, such as those of :meth:`spend`, can be lost if threads add to them at the same time.
     - In a forked process, a call that needs declared information raises CoarticError.
 
     Parameters
@@ -243,7 +244,7 @@ class Session:
         self.lock = RLock()
         """Held from the check of the budget until the trials are counted."""
 
-    # Every method can use these. They say nothing about the goals.
+    # Every method can use these. They do not tell where the goals are.
 
     @property
     def task_name(self) -> str:
@@ -337,22 +338,27 @@ class Session:
         UndeclaredError
             ``Information.KINEMATIC_MODEL`` is not declared.
         ValueError
-            ``q`` has another size, or the hand is unknown.
+            ``q`` is not a CasADi matrix with ``dof`` entries, or the hand is unknown.
         """
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot.symbolic_hand(q, hand)
 
     @property
     def used(self) -> frozenset[Information]:
-        """Declared information whose use the session has detected so far."""
+        """Declared information that the method has used so far.
+
+        It contains the information that was needed for calls of the session, and the information
+        that was passed to :meth:`reveal`. Any other use is not detected.
+        """
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
-        """Check that a solution uses only declared information, and note it in :attr:`used`.
+        """Check whether a solution uses the corrective process without declaring it.
 
-        A corrective movement without a target uses the corrective process. Raises UndeclaredError
-        if there is such a movement and the method does not declare the corrective process. Raises
-        SolutionError if the solution is not a sequence.
+        A corrective movement without a target uses the corrective process. If there is such a
+        movement, ``Information.CORRECTIVE_PROCESS`` is added to :attr:`used`. Raises
+        UndeclaredError if the method does not declare it, and SolutionError if the solution is not
+        a sequence.
         """
         if not isinstance(solution, Sequence):
             raise SolutionError(f"the solution is {brief_value(solution)}; it must be a list")
