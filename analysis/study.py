@@ -131,6 +131,8 @@ def load(folder: str | Path, *, against: str = "") -> Study:
     CoarticError
         The folder is not a results folder, the folder cannot be read, runs of its suite are
         missing, or ``against`` does not name exactly one method.
+    TypeError
+        The folder is neither a string nor a path.
 
     Examples
     --------
@@ -177,8 +179,8 @@ class Study:
     """The stored results of a folder.
 
     If the folder contains runs in several worlds, :attr:`worlds` contains a study for each world.
-    Attributes and functions that compare runs need a study of one world, and otherwise raise
-    CoarticError. They are the best known rewards, the cells, executed runs, tables and figures.
+    Attributes and functions that compare runs, such as best known rewards, tables and figures, need
+    a study of one world. For a study of several worlds they raise CoarticError.
     """
 
     folder: Path
@@ -186,7 +188,8 @@ class Study:
     """The jobs that the last ``coartic run`` asked for. A job consists of a cell (a task, and a
     method with its setting, in a world), the seed of the suite, and the numbers of the runs."""
     made_with: dict[str, Any]
-    """Versions, platform, commit, command and date of the last ``coartic run``, by name."""
+    """Details of the last ``coartic run`` by name, such as versions, platform, commit, command and
+    date."""
     stored: pd.DataFrame
     """Runs as they are stored, a row for each run, in the order of the plan. :attr:`runs` has
     further columns."""
@@ -603,7 +606,7 @@ class Study:
         return solutions[solutions.run_id.isin(self.stored.run_id)].reset_index(drop=True)
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the rewards of the trials of each run whose rewards are stored.
+        """Yield the rewards of all trials of each run with stored rewards.
 
         Yields
         ------

@@ -8,8 +8,8 @@ from a caption, a string that describes its columns, and a function that yields 
   LaTeX includes the column.
 - The function yields a pair for each row: the name of the row, and a dict that maps names of
   columns to values.
-- For each column, at least one row must have an entry, which may be NaN. Each entry of a row must
-  belong to a column. A table may have no rows.
+- For each column that is not a group with a common prefix, at least one row must have an entry,
+  which may be NaN. Each entry of a row must belong to a column. A table may have no rows.
 """
 
 from __future__ import annotations
@@ -165,8 +165,8 @@ class Table:
     ``{reference}`` stands for the name of the rewards from which gaps are measured
     (:func:`.reference`), such as ``best known reward``."""
     columns: tuple[Column, ...]
-    """Columns of the CSV file, in order. The last column is ``run_ids``: the ids of the runs from
-    which each row is computed."""
+    """Columns of the CSV file, in order. The last column, ``run_ids``, contains the ids of the runs
+    to which the row refers."""
     rows: Callable[[Study], Rows]
     """Function of a study that yields the rows, each as a pair: the name of the row, and a dict
     that maps names of columns to values."""
@@ -222,8 +222,8 @@ def table(
 def _frame_of(table: Table, study: Study) -> pd.DataFrame:
     """Return a table of a study as a frame (:meth:`Table.__call__`).
 
-    Raises KeyError if an entry of a row has no column, or if the table has rows, but no row has an
-    entry for one of the columns.
+    Raises KeyError if an entry of a row has no column, or if the table has rows, but none of them
+    has an entry for one of the columns. (A column with ``*`` in its ending needs no entries.)
     """
     named = list(table.rows(study))
     rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
@@ -652,9 +652,10 @@ def list_ranking(study: Study) -> Rows:
 
     A row contains means over tasks of the gap, of the share of the possible gain, of the gap with
     motor noise 0.01, and of the gap after 1,000 trials (``gap_early``). It also contains the gap on
-    each individual task, and the mean costs of a run. Columns ``better`` and ``worse`` are numbers
-    of individual tasks on which the method differs significantly from the learner. Gaps and shares
-    are fractions.
+    each individual task that has a best known reward, and mean costs over runs: the number of
+    forward-kinematics evaluations and the CPU time (in s). Columns ``better`` and ``worse`` are
+    numbers of individual tasks on which the method differs significantly from the learner. Gaps and
+    shares are fractions.
     """
     return _standing_rows(study, ranked=True)
 
@@ -679,9 +680,9 @@ def list_ranking(study: Study) -> Rows:
 def list_not_ranked(study: Study) -> Rows:
     """Yield a row for each method that is not ranked (:func:`.standings`), with the reason.
 
-    A row contains the gap on each individual task, a fraction. If the method solved all runs on all
-    ranked tasks, but was asked for another number of trials than the ranked methods, the row also
-    contains its mean gap over tasks.
+    For each individual task with a best known reward, a row contains the mean gap of the solved
+    runs, a fraction. If the method solved all runs on all ranked tasks, but was asked for another
+    number of trials than the ranked methods, the row also contains its mean gap over tasks.
     """
     return _standing_rows(study, ranked=False)
 
@@ -707,9 +708,10 @@ def list_differences(study: Study) -> Rows:
     with the same reference method are in ascending order of the difference. The reference method is
 
     - :attr:`.Study.against`, if it is not empty;
-    - otherwise, if the study varies parameters, the first setting of the ranking;
-    - otherwise each method from a file in turn. A method from a file is compared only with the
-      built-in methods that use the reward in the same way.
+    - otherwise, if the study varies parameters and a setting is ranked, the first setting of the
+      ranking;
+    - otherwise each method from a file in turn, if it solved all its runs on some task. A method
+      from a file is compared only with the built-in methods that use the reward in the same way.
 
     A method is left out if
 
@@ -1074,16 +1076,18 @@ def list_signatures(study: Study) -> Rows:
 
     Searches for the optimum are left out. For each other method on each task, there are
 
-    - a row for each hand sequence that at least a tenth of the method's solved runs have
-      (:func:`.with_control`), if at least one signature is defined for these runs;
+    - a row for each hand sequence for which at least one signature is compared: at least a tenth of
+      the method's solved runs have the hand sequence and a value of this signature
+      (:func:`.with_control`);
     - a row for the choice of hands itself, with an empty entry in column ``hands``, if the task is
       for two arms and has at least two goals.
 
     Signatures are means over runs. If a method selects its solution from trials
     (:func:`.selects`), and the study has runs of random search to compare with, the rows also
     contain the mean signatures of random search and the p-value of the one-sided exchange test,
-    which is not adjusted for multiple tests. On a task for two arms, column ``control_idle_arm``
-    says how random search treats the idle arm: ``with noise``, or ``still`` as under EC3.
+    which is not adjusted for multiple tests. If the task is for two arms, column
+    ``control_idle_arm`` then says how random search treats the idle arm: ``with noise``, or
+    ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     # The row of the choice of hands is above those of hand sequences.
@@ -1230,8 +1234,8 @@ def list_runtimes(study: Study) -> Rows:
     - ``trials``: the largest number of trials of a run;
     - ``half on TASK``, only for a method that uses the reward of each trial: the median, over runs
       on this task, of the number of trials to the target halfway between the reward of the
-      corrective process alone and the best known reward. The median is infinite if more than half
-      of the runs do not reach this target.
+      corrective process alone with its best hands and the best known reward. The median is infinite
+      if more than half of the runs do not reach this target.
     """
     for method, runs in runs_with_targets(study).items():
         times = {spend: times_on_tasks(study, runs, spend) for spend in SPENDS}
@@ -1272,7 +1276,7 @@ def list_learning(study: Study) -> Rows:
     Columns ``after_100``, ``after_1000`` and ``after_10000`` are means over runs of the best reward
     so far, in negative ticks. A mean is NaN if a run made fewer trials than that, or had not found
     a solution by then. Column ``corrective_best`` is the reward of the corrective process alone
-    (:attr:`.Study.corrective_best`).
+    with its best hands (:attr:`.Study.corrective_best`).
     """
     if study.is_noisy:  # the best trial so far is partly luck
         return
@@ -1464,8 +1468,8 @@ def list_methods(study: Study) -> Rows:
     descending order of the mean reward. Column ``gap`` is the mean gap of the solved runs, a
     fraction. Column ``hands`` lists the hand sequences of the solved runs with their frequencies
     (:func:`.tally`), or contains the hand sequence of the only solved run. Column ``median_run``
-    contains the first eight characters of the id of the run whose score is nearest to the median;
-    the entry is None if no run is solved.
+    contains the first eight characters of the id of the solved run whose score is nearest to the
+    median; the entry is missing if no run is solved.
     """
     places, rows = {task: place for place, task in enumerate(study.individual_tasks)}, []
     for (task, label), runs in study.cells.items():

@@ -300,17 +300,18 @@ def draw_saved(study: Study) -> Parts | None:
     """Draw the ticks of methods for each goal, minus those of the corrective process alone.
 
     The sum over goals is drawn, too. There is a panel for each individual task. Of the methods that
-    represent their algorithms (:func:`.headline_methods`), a panel has a row for each of these:
+    represent their algorithms (:func:`.headline_methods`), except the corrective process alone, a
+    panel has a row for each of these that solved a run on the task:
 
     - the learner under the condition that explores most;
     - random search;
-    - the first method, in the order of rows, that uses the reward of each trial, and the first that
-      uses the reward as a formula;
+    - the first method that uses the reward of each trial, and the first method that uses the reward
+      as a formula (in the order of rows);
     - methods from files.
 
-    The rows of all panels are in the same order: methods with runs on more tasks come first;
-    methods with runs on equally many tasks are in ascending order of the mean gap. The result is
-    None if there is nothing to draw.
+    The order of rows is the same in all panels: methods with solved runs on more tasks come first;
+    methods with solved runs on equally many tasks are in ascending order of the mean gap. The
+    result is None if there is nothing to draw.
     """
     rows, methods = list_saved(study), study.methods
     single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
@@ -551,7 +552,8 @@ def draw_runtimes(study: Study) -> Parts | None:
 
     - all methods that use the reward of each trial;
     - all methods from files;
-    - among all other methods, the one that reaches the most targets.
+    - among the methods that do not use the reward of each trial, the one that reaches the most
+      targets.
     """
     if not len(tabled := list_runtimes(study)):
         return None

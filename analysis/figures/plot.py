@@ -295,8 +295,10 @@ def for_page(plot: Plot) -> str:
 
     - The element scales with its container and has a transparent background.
     - Black is replaced by the page's ``currentColor``, so that a dark page can have light ink.
-    - Other colours are custom properties of CSS, which the page can define: ``--paper`` for the
-      inside of open markers, ``--grey``, ``--blue``, and the names of the colours of methods.
+    - White, grey, blue and the colours of methods (:data:`.COLORS`) are custom properties of CSS,
+      which the page can define: ``--paper`` (white, such as the inside of open markers),
+      ``--grey``, ``--blue``, and the names of the colours of methods. Other colours stay as they
+      are.
     - A mark with a :func:`~.style.tip` shows the text of the tip when the pointer rests on it.
     - All ids begin with the id of the plot, so that a page can have several figures. The id of the
       element with the whole drawing is the id of the plot followed by ``-drawing``.

@@ -54,7 +54,7 @@ PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
 OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": (0, (1, 1.2))}
 INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": (0, (5, 1.2, 1, 1.2))}
 """Looks of the line at the best known reward, and of the line at the reward of the corrective
-process alone: arguments of Matplotlib."""
+process alone with its best hands: arguments of Matplotlib."""
 styled = style.context(["default", RC])
 """Decorator of a drawing function. The function then draws with Matplotlib's defaults and the
 settings :data:`RC`, whatever the settings of the user are."""
@@ -131,8 +131,8 @@ def panels(
     """Return a figure with panels.
 
     If :func:`drawn_at` has set a width, the figure has this width. If the panels would then be
-    narrower than ``least``, they are arranged in fewer columns and more rows. The height of the
-    figure grows in proportion to the number of rows.
+    narrower than ``least``, they are arranged in fewer columns. The height of the figure is
+    proportional to the number of rows.
 
     Parameters
     ----------
@@ -230,8 +230,8 @@ def means(
     by : str
         Name of the column that says to which group a row belongs. Each group is drawn as a line
         with a label of its own; a row with NaN in this column is not drawn. The lines have the
-        colours of ``PALETTE`` in turn. If ``by`` is empty, all rows belong to one line without a
-        label.
+        colours of ``PALETTE`` in turn, unless ``line`` contains ``color``. If ``by`` is empty, all
+        rows belong to one line without a label.
     scale : float
         Factor by which means and intervals are multiplied: 100 turns a fraction into per cent.
     shift : float
@@ -244,7 +244,8 @@ def means(
     Raises
     ------
     CoarticError
-        The frame has no rows, a column is missing, or a value is neither a finite number nor NaN.
+        The frame is not a DataFrame or has no rows, a column is missing, or a value in ``x``, ``y``
+        or an end of an interval is neither a finite number nor NaN.
     """
     ends = [f"{y}_low", f"{y}_high"] if f"{y}_low" in getattr(frame, "columns", ()) else []
     checked(frame, numbers=[x, y, *ends], others=[by] * bool(by))

@@ -95,6 +95,8 @@ def write_report(
           folder, this is not checked.)
         - ``folder`` contains a file that has the name of a file of the report, but was not written
           by coartic.
+        - The results cannot be read, or a stored run cannot be executed again
+          (:meth:`.Study.executed`).
     """
     if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(

@@ -104,7 +104,7 @@ def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
 
 
 def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
-    """Return the methods that solved a run on each given task, in the form that ``model.js`` reads.
+    """Return the methods that solved a run on each given task, in the form that ``play.js`` reads.
 
     Each method is a dict with the keys
 
@@ -130,7 +130,7 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
 
 
 def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
-    """Return the run of a cell whose reward is nearest to the median, for ``model.js``.
+    """Return the run of a cell whose reward is nearest to the median, for ``play.js``.
 
     The run is chosen from the first 500 solved runs. The result is a dict with the keys
 

@@ -461,8 +461,8 @@ def limits(study: Study) -> dict[str, Any]:
     - ``reconstructed``: titles of the individual tasks of which a part is reconstructed;
     - ``unproven``: titles of the individual tasks whose best known reward is not proven to be the
       optimum, except the tasks in ``own``;
-    - ``own``: titles of the individual tasks whose best known reward is known only from this
-      folder;
+    - ``own``: titles of the individual tasks whose best known reward is known only from methods of
+      this folder that are not searches for the optimum (:attr:`.BestKnown.only_here`);
     - ``unknown``: titles of the individual tasks without a best known reward;
     - ``trials``: numbers of trials in runs of the learner that differ from the paper's number;
     - ``few``: smallest number of runs of the paper's learner on a task, if it is below the paper's

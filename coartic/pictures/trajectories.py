@@ -37,13 +37,12 @@ class Trajectory:
     """Execution of the solution (:func:`coartic.execute`)."""
     configurations: Array
     """Configurations, shape ``(ticks, dof)``, in length units (base) and rad (joints): a row for
-    each control tick. The first row is the start. A movement of k steps takes k + 1 ticks: its
-    first row is the configuration in which it begins, which is also the last row of the movement
-    before."""
+    each control tick. The first row is the start. A movement of k steps has k + 1 rows. The first
+    of these rows is the configuration in which the movement begins, so that the last row of the
+    previous movement is repeated. A goal that is hit without a tick has no rows of its own."""
     hits: NDArray[np.int64]
     """Index of the row in which each goal was hit, shape ``(G,)``. If a goal was hit without a
-    tick, it is the index of the last row of the movement before, or 0 if there was no tick
-    before."""
+    tick, the index is that of the last row up to then, or 0 if there was no row yet."""
     __eq__ = equal_contents
 
     @property
@@ -80,14 +79,14 @@ class Trajectory:
         Returns
         -------
         ndarray, shape (rows, dof)
-            The rows from the hit of the goal before (for goal 1, from the start) to the hit of this
-            goal, including both. A goal that is hit without a tick has one row. There are no rows
-            if the whole solution takes no ticks.
+            The rows from the hit of the previous goal (for goal 1, from the start) to the hit of
+            this goal, including both. A goal that is hit without a tick has one row. There are no
+            rows if the whole solution takes no ticks.
 
         Raises
         ------
         ValueError
-            The task does not have the goal.
+            ``goal`` is not an integer from 1 to the number of goals.
         """
         check_limits("goal", goal, 1, len(self.hits))
         start = self.hits[goal - 2] if goal > 1 else 0
@@ -105,7 +104,7 @@ class Trajectory:
         - ``left_x``, ``left_y``, ``right_x`` and ``right_y`` (in length units): the positions of
           both hands.
 
-        ``attrs["units"]`` is a dict that maps columns to units.
+        ``attrs["units"]`` is a dict that maps all columns except ``goal`` and ``hand`` to units.
         """
         import pandas as pd
 
@@ -212,7 +211,8 @@ def trajectory(
     SolutionError
         The solution breaks the task's rules, or does not hit every goal.
     ValueError
-        A constant of the model is out of bounds, or the model has motor noise.
+        A constant of the model is out of bounds or does not fit the radius of the goals, or the
+        model has motor noise.
     """
     task = as_task(task)
     execution = execute(task, movements, model=model)

@@ -1,10 +1,10 @@
 "use strict";
-/* coartic's model for browsers and Node: the same numbers as in Python, bit by bit.
+/* coartic's model for browsers and Node.
 
-   Each function has the name of its counterpart in the Python package and does the same operations in the same order;
-   a comment names the module of the counterpart. (shortest_plan, a local search, has no counterpart.) A configuration
-   is an array: x and y of the base, the joints of the left arm, the joints of the right arm. Hands are 0 (left) and
-   1 (right), goals are counted from 0. */
+   A comment before a function names the module of its counterpart in the Python package. Both do the same operations in
+   the same order, so that numbers are equal bit by bit (normal random numbers are equal to 5e-15). The planner, a local
+   search, has no such counterpart. A configuration is an array: x and y of the base, the joints of the left arm, the
+   joints of the right arm. Hands are 0 (left) and 1 (right), goals are counted from 0. */
 
 const HANDS = ["left", "right"];
 const [LEFT, RIGHT, NO_HAND] = [0, 1, 2];

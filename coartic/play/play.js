@@ -25,10 +25,10 @@ const bounded = (values) => values.map((value) => Math.max(-FAR, Math.min(FAR, v
 const ticks_by_goal = ({ hands, movements }) => hands.map((_, at) => movements.reduce((sum, { goal, ticks }) => sum + (goal === at ? ticks : 0), 0));
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
-/* The reader's choices, all of which are in the link. `mate` moves the second robot if the reader moves the first.
-   `announced` has the position from which a goal has just moved. `own` has the reader's postures, each with its hand;
-   for a posture without joints the robot chooses. With a tick below 0 the robots stand where they hit the goal that
-   they share, or the reader places one. */
+/* The reader's choices. The link contains those that differ from the first ones. `mate` moves the second robot if the
+   reader moves the first. `announced` has the position from which a goal has just moved. `own` has the reader's
+   postures, each with its hand; for a posture without joints the robot chooses. With a tick below 0 the robots stand
+   where they hit the goal that they share, or the reader places one. */
 const AT_FIRST = {
   open: 0, preset: 0, who: "learner", mate: "learner", reward: "whole", explores: "EC4", drift: 0, ahead: 1, goals: null,
   others: null, announced: null, trials: 0, tick: -1, own: null, edited: 1,
