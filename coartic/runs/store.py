@@ -160,10 +160,10 @@ class Store:
         limits = made_with.get("time_limit_s"), made_with.get("trials")
         query = """SELECT cells.id, cells.content, seed, runs, name FROM suite
             JOIN cells ON runs IS NOT NULL ORDER BY position"""
-        plan = list[Job]()
+        plan, known = list[Job](), dict[str, Any]()
         with explain_errors(self.folder):
             for cell_id, content, seed, runs, suite in self._rows(query):
-                cell = _cell_from(cell_id, content)
+                cell = _cell_from(cell_id, content, known)
                 plan.append(Job(cell, seed, range(runs), limits[0], suite, limits[1]))
         if not plan:
             raise CoarticError(f"the plan of {self.folder} is empty: {_RESUME}")
@@ -571,12 +571,22 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
     }
 
 
-def _cell_from(cell_id: str, content: str) -> Cell:
+def _cell_from(cell_id: str, content: str, known: dict[str, Any] | None = None) -> Cell:
     """Return a cell from its JSON. Attribute ``where`` of the cell's method is empty.
+
+    ``known`` contains the tasks and methods of the cells before, keyed by their JSON. The cell
+    shares those that are equal, and its own are added.
 
     Raises ValueError if the JSON is not a cell, or if it is a cell with another id.
     """
-    cell: Cell = _CELL.validate_python(json.loads(content))
+    data = json.loads(content)
+    keys = {}
+    if known is not None and isinstance(data, dict):
+        keys = {name: json.dumps(data[name]) for name in ("task", "method") if name in data}
+        data |= {name: known[key] for name, key in keys.items() if key in known}
+    cell: Cell = _CELL.validate_python(data)
+    if known is not None:
+        known |= {key: getattr(cell, name) for name, key in keys.items()}
     if cell.id != cell_id:
         raise ValueError(f"{cell.label} on {cell.task.name} does not match the id of its cell")
     return cell

@@ -55,7 +55,7 @@ from settings import (
 from coartic.analysis import TwoContexts, figures, load, mean, means
 from coartic.analysis.statistics import holm
 from coartic.estimates import LEVEL, Estimate, difference_of_means
-from common.judging import level_of, mean_beyond, two_sided_tests
+from common.judging import level_of, tests_over_tasks, two_sided_tests
 from common.writing import write_study
 
 HERE = Path(__file__).parent
@@ -209,17 +209,14 @@ def verdicts(cells):
 
     Returns a table with a row for each cell: ``p`` and ``opposite_p`` after correction, each with
     ``_without`` the task that favours this side most, ``skewness``, the verdict with all tasks
-    (``all_tasks``), that ``without`` this task, the ``verdict`` that needs both, and the one that
-    two-tailed tests would give (``verdict_two_tailed``; a description, not registered).
+    (``all_tasks``), that ``without`` this task, and the ``verdict`` that needs both.
     """
-    count, columns = len(cells), {}
-    for side, name in (("greater", "p"), ("less", "opposite_p")):
-        found = [mean_beyond("{}", values, 0.0, side) for values in cells.values()]
-        for part, suffix in (("tests", ""), ("without", "_without")):
-            tests = [getattr(each, part) for each in found]
-            columns[name + suffix] = holm([test[0].p if test else np.nan for test in tests], count)
+    values, columns = [np.asarray(each, float) for each in cells.values()], {}
+    for sign, name in ((1, "p"), (-1, "opposite_p")):
+        tests = [tests_over_tasks(sign * each, 0.0) for each in values]
+        for number, suffix in enumerate(("", "_without")):
+            columns[name + suffix] = holm([pair[number].p for pair in tests], len(cells))
     table = pd.DataFrame(columns, index=[*cells])
-    values = [np.asarray(each, float)[np.isfinite(each)] for each in cells.values()]
     table["skewness"] = [stats.skew(each) if np.ptp(each) else 0.0 for each in values]
     means = np.array([each.mean() for each in values])
     for name, suffix in (("all_tasks", ""), ("without", "_without")):
@@ -233,11 +230,14 @@ def verdicts(cells):
     levels = [level_of(each) for each in values]
     is_sure = np.fmax(p, p_without) < levels
     table["verdict"] = table.all_tasks.where((table.all_tasks == table.without) & is_sure, "open")
-    is_sure = two_sided_tests(dict(enumerate(values))).differs
-    table["verdict_two_tailed"] = np.where(
-        is_sure, np.where(means > 0, "holds", "reversed"), "open"
-    )
     return table
+
+
+def two_tailed_verdicts(cells):
+    """Return the verdicts that two-tailed tests would give: a description, not registered."""
+    tests = two_sided_tests(cells)
+    verdicts = np.where(tests["mean"] > 0, "holds", "reversed")
+    return pd.Series(np.where(tests.differs, verdicts, "open"), tests.index)
 
 
 EXPECTED = {"h": "holds", "r": "reversed", "o": "open"}
@@ -259,7 +259,7 @@ def tabulate(runs, leans):
                 cells[world, group], counted[world, group] = values.to_numpy(float), row
             elif group not in FAMILIES:
                 rows.append(row | of_paper(claim, world, group, runs, leans).columns("value"))
-        judged = verdicts(cells)
+        judged = verdicts(cells).assign(verdict_two_tailed=two_tailed_verdicts(cells))
         for key, row in counted.items():
             answer = CLAIMS[claim]["expected"][key[0]][FAMILIES.index(key[1])]
             values = cells[key]
