@@ -567,11 +567,12 @@ def other_tasks(scores: Scores) -> Estimate:
         count = len(instances)
         which = rng.integers(count, size=(FEWER_RESAMPLES, count))
         drawn = values[family][which]
-        for number, runs in enumerate(instances):
-            chosen = which == number
+        # For each instance, where it was drawn, in the order of the bootstrap samples.
+        ends = np.cumsum(np.bincount(which.ravel(), minlength=count))[:-1]
+        for runs, at in zip(instances, np.split(which.argsort(None, "stable"), ends), strict=True):
             if np.ptp(runs):
-                places = rng.integers(len(runs), size=(int(chosen.sum()), len(runs)))
-                drawn[chosen] += runs[places].mean(axis=1) - runs.mean()
+                places = rng.integers(len(runs), size=(len(at), len(runs)))
+                drawn.flat[at] += runs[places].mean(axis=1) - runs.mean()
         wider = math.sqrt(count / (count - 1))
         deviations += (drawn.mean(axis=1) - values[family].mean()) * wider
     if np.abs(deviations).max() <= NEGLIGIBLE * abs(mean):

@@ -340,7 +340,7 @@ class Study:
     def _executed_afresh(self, task: str, run_ids: Sequence[str]) -> list[float]:
         """Return minus the mean ticks of 1,000 noisy executions of each run in ``run_ids``."""
         with open_results(self.folder) as store:
-            answers = [store.run(run_id).part("solution") for run_id in run_ids]
+            answers = store.solutions_of(run_ids)
         return self._reference_values(task, answers)
 
     def _reference_values(self, task: str, answers: Sequence[Sequence[Movement]]) -> list[float]:

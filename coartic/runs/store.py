@@ -457,6 +457,16 @@ class Store:
                 if text is not None
             }
 
+    def solutions_of(self, run_ids: Iterable[str]) -> list[tuple[Movement, ...]]:
+        """Return the movements of the solution of each run. Raises CoarticError for a missing one.
+
+        In contrast to :meth:`run`, nothing else of the runs is read or checked.
+        """
+        query = "SELECT json_extract(movements, '$.solution') FROM results WHERE run_id = ?"
+        with explain_errors(self.folder):
+            texts = [self._db.execute(query, (run_id,)).fetchone()[0] for run_id in run_ids]
+            return [tuple(map(movement_from, json.loads(text))) for text in texts]
+
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Yield the rewards of the trials of each run of the plan.
 
