@@ -25,7 +25,9 @@ RESAMPLED = (
 """Columns that depend on the number of resamples, which is smaller in tests."""
 
 FEW = 999
-"""Resamples in these tests."""
+"""Resamples of claims in these tests."""
+FEWER = 99
+"""Resamples of intervals and tests of study human, on which no number here depends."""
 
 
 @pytest.fixture(autouse=True)
@@ -75,7 +77,7 @@ def of_plans(name, _):
 
 def of_human(shipped):
     study, body_shares = programs("human", "study", "body_shares")
-    study.RESAMPLES = body_shares.RESAMPLES = FEW
+    study.RESAMPLES = body_shares.RESAMPLES = FEWER
     body = body_shares.measure_body(shipped("comparison").worlds[""])
     tables = study.judge_all(rows_of("human", "effects.csv", 0), rows_of("human", index=0))
     return tables | {"body": body}
