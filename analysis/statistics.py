@@ -566,15 +566,17 @@ def other_tasks(scores: Scores) -> Estimate:
         rng = np.random.default_rng([SEED, index])
         count = len(instances)
         which = rng.integers(count, size=(FEWER_RESAMPLES, count))
-        drawn = values[family][which]
-        # For each instance, where it was drawn, in the order of the bootstrap samples.
+        drawn = values[family][which].ravel()
+        # Where each instance was drawn, in the order of the bootstrap samples.
+        order = which.astype(np.min_scalar_type(count)).argsort(None, "stable")
         ends = np.cumsum(np.bincount(which.ravel(), minlength=count))[:-1]
-        for runs, at in zip(instances, np.split(which.argsort(None, "stable"), ends), strict=True):
+        for runs, at in zip(instances, np.split(order, ends), strict=True):
             if np.ptp(runs):
                 places = rng.integers(len(runs), size=(len(at), len(runs)))
-                drawn.flat[at] += runs[places].mean(axis=1) - runs.mean()
+                drawn[at] += runs.take(places).mean(axis=1) - runs.mean()
         wider = math.sqrt(count / (count - 1))
-        deviations += (drawn.mean(axis=1) - values[family].mean()) * wider
+        means = drawn.reshape(which.shape).mean(axis=1)
+        deviations += (means - values[family].mean()) * wider
     if np.abs(deviations).max() <= NEGLIGIBLE * abs(mean):
         return Estimate(mean, mean, mean, n=n)
     low, high = mean + np.quantile(deviations / len(values), TAILS)

@@ -158,7 +158,7 @@ def _label_in(study: Study, name: str) -> str:
     then among their titles. An id of the learner can be shortened to its condition, such as
     ``EC4``. Raises CoarticError if the name refers to no method, or to more than one.
     """
-    methods = study.methods
+    methods = methods_of(_labelled(study.stored), study.declared, study.marks)  # without gaps
     for names in (methods.index, methods.method_id, methods.title):
         for wanted in (name, f"{METHOD_PREFIX}{name}"):
             labels = [str(label) for label in methods.index[names == wanted]]
@@ -326,9 +326,19 @@ class Study:
         process is used instead. In a world with noise, a reward is minus the mean ticks of 1,000
         executions, whose noise differs from the noise by which runs are judged.
         """
-        fresh = self._executed_afresh if self.is_noisy else None
         runs, tasks = self.stored, self.tasks.values()
-        rewards = best_known(runs, tasks, models=self.models, fresh=fresh)
+        if self.is_noisy:
+            with open_results(self.folder) as store:
+                rewards = best_known(
+                    runs,
+                    tasks,
+                    models=self.models,
+                    fresh=lambda task, run_ids: self._reference_values(
+                        task, store.solutions_of(run_ids)
+                    ),
+                )
+        else:
+            rewards = best_known(runs, tasks, models=self.models)
         for name, best in rewards.items():
             alone, hands = self._corrective_reference(name)
             if alone > best.reward:
@@ -336,12 +346,6 @@ class Study:
                 reward = alone if self.is_noisy else int(alone)
                 rewards[name] = BestKnown(reward, best.bound, hands, source, "", only_here)
         return rewards
-
-    def _executed_afresh(self, task: str, run_ids: Sequence[str]) -> list[float]:
-        """Return minus the mean ticks of 1,000 noisy executions of each run in ``run_ids``."""
-        with open_results(self.folder) as store:
-            answers = store.solutions_of(run_ids)
-        return self._reference_values(task, answers)
 
     def _reference_values(self, task: str, answers: Sequence[Sequence[Movement]]) -> list[float]:
         """Return minus the mean ticks of 1,000 executions of each answer.
