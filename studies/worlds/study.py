@@ -245,7 +245,7 @@ EXPECTED = {"h": "holds", "r": "reversed", "o": "open"}
 
 def tabulate(runs, leans):
     """Return the matrix: a row for each claim, world and family, or task of the paper."""
-    rows = []
+    rows, by_task = [], dict([*runs.groupby(["world", "task"], sort=False)])
     for claim in CLAIMS:
         found = (values_of_pairs(leans, claim) if claim.endswith(("leans", "lean"))
                  else values_of(runs[runs.world != LONG.name], claim))  # fmt: skip
@@ -258,7 +258,7 @@ def tabulate(runs, leans):
             if group in FAMILIES and len(values) >= 3:
                 cells[world, group], counted[world, group] = values.to_numpy(float), row
             elif group not in FAMILIES:
-                rows.append(row | of_paper(claim, world, group, runs, leans).columns("value"))
+                rows.append(row | of_paper(claim, (world, group), by_task, leans).columns("value"))
         judged = verdicts(cells).assign(verdict_two_tailed=two_tailed_verdicts(cells))
         for key, row in counted.items():
             answer = CLAIMS[claim]["expected"][key[0]][FAMILIES.index(key[1])]
@@ -273,15 +273,18 @@ def tabulate(runs, leans):
     return table.set_index((table.claim + " " + table.world + " " + table.group).rename("row"))
 
 
-def of_paper(claim, world, task, runs, leans):
-    """Return a claim's value on a task of the paper, with its interval over runs.
+def of_paper(claim, key, by_task, leans):
+    """Return a claim's value in a world on a task of the paper, with its interval over runs.
+
+    ``by_task`` contains the runs by ``key``, the world and the task.
 
     The difference of two leans has the interval of Zou and Donner (2008), which is made of the
     intervals of both.
     """
     if claim.endswith(("leans", "lean")):
         part = "joints" if claim == "joints-lean" else "all"
-        mine = leans[(leans.world == world) & (leans.pair == task) & (leans.part == part)]
+        world, pair = key
+        mine = leans[(leans.world == world) & (leans.pair == pair) & (leans.part == part)]
         mine = mine.set_index("method")
         one = mine.loc[LEARNER]
         if claim == "joints-lean":
@@ -291,7 +294,7 @@ def of_paper(claim, world, task, runs, leans):
         down = np.hypot(one.lean - one.lean_low, other.lean_high - other.lean)
         up = np.hypot(one.lean_high - one.lean, other.lean - other.lean_low)
         return Estimate(value, value - down, value + up)
-    used = with_failures(runs[(runs.world == world) & (runs.task == task)])
+    used = with_failures(by_task[key])
     used = used.assign(share=shares(used, claim)).dropna(subset="share")
     first, second = BETTER.get(claim, (LEARNER, RANDOM))
     return difference_of_means(
