@@ -215,22 +215,18 @@ def verdicts(cells):
     for sign, name in ((1, "p"), (-1, "opposite_p")):
         tests = [tests_over_tasks(sign * each, 0.0) for each in values]
         for number, suffix in enumerate(("", "_without")):
-            columns[name + suffix] = holm([pair[number].p for pair in tests], len(cells))
-    table = pd.DataFrame(columns, index=[*cells])
-    table["skewness"] = [stats.skew(each) if np.ptp(each) else 0.0 for each in values]
-    means = np.array([each.mean() for each in values])
+            columns[name + suffix] = np.array(holm([pair[number].p for pair in tests], len(cells)))
+    columns["skewness"] = [stats.skew(each) if np.ptp(each) else 0.0 for each in values]
+    means, levels = (np.array([of(each) for each in values]) for of in (np.mean, level_of))
+    sure = []
     for name, suffix in (("all_tasks", ""), ("without", "_without")):
-        holds = (means > 0) & (table["p" + suffix] < LEVEL)
-        turns = (means < 0) & (table["opposite_p" + suffix] < LEVEL)
-        table[name] = np.select([holds, turns], ["holds", "reversed"], "open")
-    p, p_without = (
-        np.where(means > 0, table["p" + suffix], table["opposite_p" + suffix])
-        for suffix in ("", "_without")
-    )
-    levels = [level_of(each) for each in values]
-    is_sure = np.fmax(p, p_without) < levels
-    table["verdict"] = table.all_tasks.where((table.all_tasks == table.without) & is_sure, "open")
-    return table
+        p, opposite_p = columns["p" + suffix], columns["opposite_p" + suffix]
+        sides = (means > 0) & (p < LEVEL), (means < 0) & (opposite_p < LEVEL)
+        columns[name] = np.select(sides, ["holds", "reversed"], "open")
+        sure.append(np.where(means > 0, p, opposite_p))
+    is_sure = (columns["all_tasks"] == columns["without"]) & (np.fmax(*sure) < levels)
+    columns["verdict"] = np.where(is_sure, columns["all_tasks"], "open")
+    return pd.DataFrame(columns, index=[*cells])
 
 
 def two_tailed_verdicts(cells):
