@@ -313,7 +313,10 @@ def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
     few, many = rows.shape[1], len(pool) - rows.shape[1]
     values = pool[rows]
     if not many:
-        return values.mean(axis=1), values.var(axis=1, ddof=1) / n
+        means = values.mean(axis=1)
+        values -= means[:, None]
+        values *= values
+        return means, values.sum(axis=1) / (few - 1) / n
     sums, squares = values.sum(axis=1), (values**2).sum(axis=1)
     mean, other = sums / few, (pool.sum() - sums) / many
     variances = sum(
