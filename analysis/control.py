@@ -25,6 +25,7 @@ import math
 from collections.abc import Iterator
 from functools import lru_cache
 from statistics import mode
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -154,14 +155,22 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
       value of this parameter.
     - For a method without this parameter, the result is True.
     """
-    run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
         return True
-    if not run.method.startswith(METHOD_PREFIX):
-        return bool(run.get("idle_arm", True))
-    name = study.methods.condition[label] or run.base  # the base of a user's condition
-    changed = run.get("modify_other")
+    runs = study.cells[task, label]
+    if not study.methods.method_id[label].startswith(METHOD_PREFIX):
+        return bool(_first(runs, "idle_arm", True))
+    name = study.methods.condition[label] or _first(runs, "base")  # that of a user's condition
+    changed = _first(runs, "modify_other")
     return EVERY_CONDITION[name].modify_other if pd.isna(changed) else bool(changed)
+
+
+def _first(runs: pd.DataFrame, column: str, default: object = None) -> Any:
+    """Return the value of the first run in a column, or the default if there is no such column.
+
+    A whole row of the frame would take long, as each column has a type of its own.
+    """
+    return runs[column].iloc[0] if column in runs else default
 
 
 @lru_cache(maxsize=4_096)
@@ -186,7 +195,7 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
     of_search = study.methods[study.methods.algorithm == "random search"]
     for label in map(str, of_search.index):
         cell = study.cells.get((task, label))
-        if cell is None or cell.iloc[0].get("stages", 1) > 1:
+        if cell is None or _first(cell, "stages", 1) > 1:
             continue
         hands = {*solved(cell).hands}
         sequences = (

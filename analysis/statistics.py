@@ -320,7 +320,10 @@ def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
     few, many = rows.shape[1], len(pool) - rows.shape[1]
     values = pool[rows]
     if not many:
-        return values.mean(axis=1), values.var(axis=1, ddof=1) / n
+        means = values.mean(axis=1)
+        values -= means[:, None]
+        values *= values
+        return means, values.sum(axis=1) / (few - 1) / n
     sums, squares = values.sum(axis=1), (values**2).sum(axis=1)
     mean, other = sums / few, (pool.sum() - sums) / many
     variances = sum(
@@ -576,14 +579,17 @@ def other_tasks(scores: Scores) -> Estimate:
         rng = np.random.default_rng([SEED, index])
         count = len(instances)
         which = rng.integers(count, size=(FEWER_RESAMPLES, count))
-        drawn = values[family][which]
-        for number, runs in enumerate(instances):
-            chosen = which == number
+        drawn = values[family][which].ravel()
+        # Where each instance was drawn, in the order of the bootstrap samples.
+        order = which.astype(np.min_scalar_type(count)).argsort(None, "stable")
+        ends = np.cumsum(np.bincount(which.ravel(), minlength=count))[:-1]
+        for runs, at in zip(instances, np.split(order, ends), strict=True):
             if np.ptp(runs):
-                places = rng.integers(len(runs), size=(int(chosen.sum()), len(runs)))
-                drawn[chosen] += runs[places].mean(axis=1) - runs.mean()
+                places = rng.integers(len(runs), size=(len(at), len(runs)))
+                drawn[at] += runs.take(places).mean(axis=1) - runs.mean()
         wider = math.sqrt(count / (count - 1))
-        deviations += (drawn.mean(axis=1) - values[family].mean()) * wider
+        means = drawn.reshape(which.shape).mean(axis=1)
+        deviations += (means - values[family].mean()) * wider
     if np.abs(deviations).max() <= NEGLIGIBLE * abs(mean):
         return Estimate(mean, mean, mean, n=n)
     low, high = mean + np.quantile(deviations / len(values), TAILS)

@@ -161,7 +161,7 @@ def _label_in(study: Study, name: str) -> str:
     can be left out, as in ``EC4``. Raises CoarticError if the name refers to no row of
     :attr:`Study.methods`, or to more than one.
     """
-    methods = study.methods
+    methods = methods_of(_labelled(study.stored), study.declared, study.marks)  # without gaps
     for names in (methods.index, methods.method_id, methods.title):
         for wanted in (name, f"{METHOD_PREFIX}{name}"):
             labels = [str(label) for label in methods.index[names == wanted]]
@@ -336,9 +336,19 @@ class Study:
         executions. Their noise differs from the noise with which runs are judged. Raises
         CoarticError for a study of several worlds.
         """
-        fresh = self._executed_afresh if self.is_noisy else None
         runs, tasks = self.stored, self.tasks.values()
-        rewards = best_known(runs, tasks, models=self.models, fresh=fresh)
+        if self.is_noisy:
+            with open_results(self.folder) as store:
+                rewards = best_known(
+                    runs,
+                    tasks,
+                    models=self.models,
+                    fresh=lambda task, run_ids: self._reference_values(
+                        task, store.solutions_of(run_ids)
+                    ),
+                )
+        else:
+            rewards = best_known(runs, tasks, models=self.models)
         for name, best in rewards.items():
             alone, hands = self._corrective_reference(name)
             if alone > best.reward:
@@ -346,15 +356,6 @@ class Study:
                 reward = alone if self.is_noisy else int(alone)
                 rewards[name] = BestKnown(reward, best.bound, hands, source, "", only_here)
         return rewards
-
-    def _executed_afresh(self, task: str, run_ids: Sequence[str]) -> list[float]:
-        """Return minus the mean ticks of 1,000 executions with motor noise, for each run.
-
-        The solutions of the runs in ``run_ids`` are executed (:meth:`_reference_values`).
-        """
-        with open_results(self.folder) as store:
-            answers = [store.run(run_id).part("solution") for run_id in run_ids]
-        return self._reference_values(task, answers)
 
     def _reference_values(self, task: str, answers: Sequence[Sequence[Movement]]) -> list[float]:
         """Return minus the mean ticks of 1,000 executions with motor noise, for each answer.

@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import sys
+from functools import cache
 
 import pytest
 from hypothesis import settings
@@ -138,11 +139,31 @@ def traced(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def shipped():
-    """The shipped results of suite ``comparison``, which nobody changes."""
+def shipped_folder(tmp_path_factory):
+    """A folder with the results folders of the suites whose runs ship."""
+    from make_findings import unpack_shipped
+
+    from tests.support.suites import made_once
+
+    def make(folder):
+        folder.mkdir()
+        unpack_shipped(folder)
+
+    return made_once(tmp_path_factory, "shipped-results", make)
+
+
+@pytest.fixture(scope="session")
+def shipped_study(shipped_folder):
+    """Loads a suite whose runs ship, once. Nobody changes the study."""
     from coartic.analysis.study import load
 
-    return load("shipped").worlds[""]
+    return cache(lambda suite: load(shipped_folder / suite))
+
+
+@pytest.fixture(scope="session")
+def shipped(shipped_study):
+    """The shipped results of suite ``comparison``, which nobody changes."""
+    return shipped_study("comparison").worlds[""]
 
 
 @pytest.fixture(scope="session")
@@ -229,11 +250,13 @@ def visited(browser, pages):
 
 
 FIRST = (
-    *("test_conformance", "test_pool", "test_cli", "test_method_files", "test_runner"),
-    *("test_cluster", "test_report_page", "test_play_page", "test_report", "test_figures"),
+    *("studies/test_stored_tables", "test_figures", "test_signatures", "test_conformance"),
+    *("test_pool", "test_cli", "test_method_files", "test_runner", "test_cluster"),
+    *("test_report_page", "test_play_page", "test_report"),
 )
-"""Modules that begin: those that start processes, then those that read one report and draw, so that
-one worker does; they take longest, and none is left alone with them at the end."""
+"""Modules that begin: those that use tables of the shipped runs, and those that start processes,
+then those that read one report, so that one worker does; they take longest, and none is left alone
+with them at the end."""
 
 
 def pytest_collection_modifyitems(items):

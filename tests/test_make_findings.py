@@ -1,15 +1,11 @@
 """The pages of the site whose numbers come from stored results."""
 
 import re
-import tomllib
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from coartic.analysis import load
-from coartic.runs.shipped import shipped_hashes
 from coartic.tasks.optima import BEST_KNOWN
 from common.writing import fill_page
 from tests.support.made_up import row, study_of
@@ -18,7 +14,6 @@ from tests.support.processes import ROOT, program
 
 DOCS = ROOT / "docs"
 STORED = DOCS / "stored"
-SOURCES = tomllib.loads((STORED / "SOURCES.toml").read_text("utf-8"))["tables"]
 make_findings = program(DOCS / "make_findings.py")
 
 
@@ -55,38 +50,6 @@ def test_what_pages_ask_for_is_stored_from_the_results_that_are_given(tmp_path, 
     made = {path.name for path in (stored / "planted").iterdir()}
     assert made == {"ranking.csv", "ranking.svg"}
     assert {path.name for path in stored.iterdir()} == {"old", "planted"}
-
-
-def test_what_is_stored_is_what_the_shipped_runs_make(tmp_path):
-    """Each table and figure of a suite whose runs ship, with the code of today.
-
-    Tables have six digits. Ends of intervals and p-values may differ by a tie between resamples.
-    """
-    unpacked = make_findings.unpack_shipped(tmp_path)
-    todo = "make it again: PYTHONPATH=studies python docs/make_findings.py --from shipped"
-    for suite in shipped_hashes():
-        study = load(unpacked / suite)
-        tables = [
-            file for table in SOURCES if table.get("source") == suite for file in table["files"]
-        ]
-        assert {ROOT / file for file in tables} == {*(STORED / suite).glob("*.csv")}
-        for file in tables:
-            name, _, world = Path(file).stem.partition("-in-")
-            made = make_findings.make_table(study.worlds[world], name)
-            made.to_csv(tmp_path / "made.csv", float_format="%.6g")
-            made, stored = (
-                pd.read_csv(path, index_col=0) for path in (tmp_path / "made.csv", ROOT / file)
-            )
-            assert [*made] == [*stored], f"{file}: {todo}"
-            tied = made.columns.str.contains(r"_low$|_high$|\bp\b|^p_|_p$|_p_")
-            for columns, rtol in ((~tied, 1e-5), (tied, 0.02)):
-                pd.testing.assert_frame_equal(
-                    made.loc[:, columns], stored.loc[:, columns], rtol=rtol, atol=1e-9,
-                    obj=f"{file} ({todo})",
-                )  # fmt: skip
-        for figure in (STORED / suite).glob("*.svg"):
-            drawn = make_findings.draw_figure(study.worlds[""], figure.stem)
-            assert draw_the_same(drawn, figure.read_bytes()), f"{figure}: {todo}"
 
 
 def test_stored_gaps_of_families_are_to_the_best_known_rewards_that_ship():

@@ -9,8 +9,8 @@ import json
 import re
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache, cached_property
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -78,6 +78,14 @@ class MethodInfo:
     def is_ours(self) -> bool:
         """True for a built-in method of coartic."""
         return self.origin == BUILT_IN
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """The declaration as plain data, as it is stored. Do not change the dict."""
+        content = asdict(replace(self, tuned_on="", where=""))
+        if self.is_ours:
+            del content["facts"]  # they are in its class
+        return content
 
     @property
     def key(self) -> tuple[str, str, str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -92,12 +92,9 @@ class Cell:
     @property
     def content(self) -> dict[str, Any]:
         """The cell as it is stored: a dict of plain data."""
-        method = asdict(replace(self.method, tuned_on="", where=""))
-        if self.method.is_ours:
-            del method["facts"]  # they are in its class
         return {
             "task": self.definition,
-            "method": method,
+            "method": self.method.content,
             "parameters": self.parameters,
             "model": self.model.stored(self.task.radius),
             "trial_budget": self.trial_budget,

@@ -166,10 +166,10 @@ class Store:
         limits = made_with.get("time_limit_s"), made_with.get("trials")
         query = """SELECT cells.id, cells.content, seed, runs, name FROM suite
             JOIN cells ON runs IS NOT NULL ORDER BY position"""
-        plan = list[Job]()
+        plan, known = list[Job](), dict[str, Any]()
         with explain_errors(self.folder):
             for cell_id, content, seed, runs, suite in self._rows(query):
-                cell = _cell_from(cell_id, content)
+                cell = _cell_from(cell_id, content, known)
                 plan.append(Job(cell, seed, range(runs), limits[0], suite, limits[1]))
         if not plan:
             raise CoarticError(f"the plan of {self.folder} is empty: {_RESUME}")
@@ -486,6 +486,16 @@ class Store:
                 if text is not None
             }
 
+    def solutions_of(self, run_ids: Iterable[str]) -> list[tuple[Movement, ...]]:
+        """Return the movements of the solution of each run. Raises CoarticError for a missing one.
+
+        In contrast to :meth:`run`, nothing else of the runs is read or checked.
+        """
+        query = "SELECT json_extract(movements, '$.solution') FROM results WHERE run_id = ?"
+        with explain_errors(self.folder):
+            texts = [self._db.execute(query, (run_id,)).fetchone()[0] for run_id in run_ids]
+            return [tuple(map(movement_from, json.loads(text))) for text in texts]
+
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Yield the rewards of each run of the plan that has stored rewards.
 
@@ -606,13 +616,21 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
     }
 
 
-def _cell_from(cell_id: str, content: str) -> Cell:
+def _cell_from(cell_id: str, content: str, known: dict[str, Any] | None = None) -> Cell:
     """Return the cell that is stored as JSON in table ``cells``.
 
-    Attribute ``where`` of the cell's method is empty. Raises ValueError if ``content`` is not the
-    JSON of a cell with the id ``cell_id``.
+    Attribute ``where`` of the cell's method is empty. ``known`` is a dict that maps the JSON of
+    tasks and methods of earlier cells to these objects: the cell shares the equal ones, and its own
+    are added. Raises ValueError if ``content`` is not the JSON of a cell with the id ``cell_id``.
     """
-    cell: Cell = _CELL.validate_python(json.loads(content))
+    data = json.loads(content)
+    keys = {}
+    if known is not None and isinstance(data, dict):
+        keys = {name: json.dumps(data[name]) for name in ("task", "method") if name in data}
+        data |= {name: known[key] for name, key in keys.items() if key in known}
+    cell: Cell = _CELL.validate_python(data)
+    if known is not None:
+        known |= {key: getattr(cell, name) for name, key in keys.items()}
     if cell.id != cell_id:
         raise ValueError(f"{cell.label} on {cell.task.name} does not match the id of its cell")
     return cell

@@ -184,12 +184,13 @@ def _largest_p(tests: Iterable[Estimate]) -> float:
     return max((test.p for test in tests if not math.isnan(test.p)), default=math.nan)
 
 
-def _tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
+def tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
     """Test whether the mean over tasks exceeds a bound, with and without the largest value.
 
     ``values`` contains one value for each of at least two tasks, shape ``(tasks,)``. The first test
     uses all values, and the second test leaves out the largest value. A p-value is NaN for a test
-    of a single value, or of values that are all equal to the bound.
+    of a single value, or of values that are all equal to the bound. For the opposite, pass both
+    arguments with the other sign.
     """
     by_task = np.asarray(values, dtype=np.float64)
     others = np.delete(by_task, by_task.argmax())
@@ -259,8 +260,8 @@ def mean_beyond(
     if len(found) < MIN_TASKS:
         return Finding(None, f"fewer than {MIN_TASKS} random tasks can be judged")
     sign = SIGNS[side]
-    test, without = _tests_over_tasks(sign * found, sign * bound)
-    opposite = max(_tests_over_tasks(-sign * found, -sign * bound), key=lambda test: test.p)
+    test, without = tests_over_tasks(sign * found, sign * bound)
+    opposite = max(tests_over_tasks(-sign * found, -sign * bound), key=lambda test: test.p)
     words = interval(mean(found).columns("mean"), "mean", 2)
     evidence = f"{sentence.replace('{}', words)} ({len(found)} tasks)"
     return Finding(test.value > 0, evidence, (test,), (opposite,), (without,), level_of(found))

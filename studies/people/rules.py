@@ -1,5 +1,6 @@
 """Define the rules of study people: repeats that count, leans, the test, and its power."""
 
+from functools import cache
 from itertools import product
 from pathlib import Path
 
@@ -207,6 +208,7 @@ def power(shift, n, studies=20_000):
     return float((p <= LEVEL).mean())
 
 
+@cache
 def smallest_shift(n):
     """Return the smallest mean, in SDs of n people, that the test finds with 90 % power."""
     low, high = 0.0, 20.0

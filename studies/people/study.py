@@ -146,17 +146,20 @@ def measure_pairs(runs):
     """
     rows = []
     for (label, instance), of_pair in runs.groupby(["method", "task"], sort=False):
+        of_contexts = []
+        for context in CONTEXTS:
+            of_task = of_pair[of_pair.context == context]
+            at, following = (
+                of_task[[f"{kind}_{name}" for name in PARTS["all"]]].to_numpy()
+                for kind in ("at", "next")
+            )
+            of_contexts.append(np.stack([0 * at, at, following], axis=1))
         for part, coordinates in PARTS.items():
-            both = []
-            for context in CONTEXTS:
-                of_task = of_pair[of_pair.context == context]
-                at, following = (
-                    of_task[[f"{kind}_{name}" for name in coordinates]].to_numpy()
-                    for kind in ("at", "next")
-                )
-                both.append(np.stack([0 * at, at, following], axis=1))
+            columns = [PARTS["all"].index(name) for name in coordinates]
+            both = [each[:, :, columns] for each in of_contexts]
             alone = min(map(len, both)) == 1
-            found = lean(*both, np.random.default_rng(0), deterministic=alone)
+            # Of the interval, which takes resamples, nothing is used.
+            found = lean(*both, np.random.default_rng(0), deterministic=alone, resamples=1)
             rows.append({
                 "method": label, "task": instance, "part": part, "lean": found.more.value,
                 "difference": distance_of_means(*(each[:, 1] for each in both)),

@@ -4,6 +4,7 @@ import math
 import tomllib
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -77,28 +78,8 @@ class Reader:
         return MIN_VALUES_ON_INSTANCE if self.task(name).family else MIN_VALUES
 
     def runs(self, task, label):
-        """Return the runs of a method on a task.
-
-        Raises MissingError if a run has no solution. For the learner and random search, it is also
-        raised for too few runs, and for another number of trials than that of the paper.
-        """
-        runs, title = self.study.cells.get((task, label)), self.title(task)
-        if runs is None:
-            raise MissingError(f"this folder has no runs of {label} on {title}")
-        if failed := (runs.status != "ok").sum():
-            raise MissingError(
-                f"{failed} of {len(runs)} runs of {label} on {title} failed, so "
-                "the mean of the others would mislead"
-            )
-        if self.study.methods.algorithm[label] in ("learner", "random search"):
-            trials = sorted(runs.trials.unique())
-            if trials != [TRIALS]:
-                raise MissingError(
-                    f"the paper's runs have {TRIALS} trials; those of {label} on {title} have "
-                    f"{', '.join(map(str, trials))}"
-                )
-            if len(runs) < (least := self.least_runs(task)):
-                raise MissingError(f"fewer than {least} runs of {label} on {title}")
+        """Return the runs of a method on a task, and note their ids (:func:`usable_runs`)."""
+        runs = usable_runs(self.study, task, label)
         self.run_ids.extend(runs.run_id)
         return runs
 
@@ -217,3 +198,32 @@ def there(reads):
     for read in reads:
         with suppress(MissingError):
             yield read()
+
+
+@lru_cache(maxsize=8_192)
+def usable_runs(study, task, label):
+    """Return the runs of a method on a task.
+
+    Raises MissingError if a run has no solution. For the learner and random search, it is also
+    raised for too few runs, and for another number of trials than that of the paper. The
+    result is cached: claims ask for the same runs.
+    """
+    read = Reader(study)
+    runs, title = study.cells.get((task, label)), read.title(task)
+    if runs is None:
+        raise MissingError(f"this folder has no runs of {label} on {title}")
+    if failed := (runs.status != "ok").sum():
+        raise MissingError(
+            f"{failed} of {len(runs)} runs of {label} on {title} failed, so "
+            "the mean of the others would mislead"
+        )
+    if study.methods.algorithm[label] in ("learner", "random search"):
+        trials = sorted(runs.trials.unique())
+        if trials != [TRIALS]:
+            raise MissingError(
+                f"the paper's runs have {TRIALS} trials; those of {label} on {title} have "
+                f"{', '.join(map(str, trials))}"
+            )
+        if len(runs) < (least := read.least_runs(task)):
+            raise MissingError(f"fewer than {least} runs of {label} on {title}")
+    return runs

@@ -55,7 +55,7 @@ from settings import (
 from coartic.analysis import TwoContexts, figures, load, mean, means
 from coartic.analysis.statistics import holm
 from coartic.estimates import LEVEL, Estimate, difference_of_means
-from common.judging import level_of, mean_beyond, two_sided_tests
+from common.judging import level_of, tests_over_tasks, two_sided_tests
 from common.writing import write_study
 
 HERE = Path(__file__).parent
@@ -240,36 +240,31 @@ def verdicts(cells):
     - ``skewness``: skewness of the values;
     - ``all_tasks``, ``without``: verdicts from the p-values with and without this task;
     - ``verdict``: the verdict that both give if the p-values are below :func:`.level_of`, otherwise
-      ``open``;
-    - ``verdict_two_tailed``: the verdict that two-tailed tests would give. It is only a
-      description, and was not registered.
+      ``open``.
     """
-    count, columns = len(cells), {}
-    for side, name in (("greater", "p"), ("less", "opposite_p")):
-        found = [mean_beyond("{}", values, 0.0, side) for values in cells.values()]
-        for part, suffix in (("tests", ""), ("without", "_without")):
-            tests = [getattr(each, part) for each in found]
-            columns[name + suffix] = holm([test[0].p if test else np.nan for test in tests], count)
-    table = pd.DataFrame(columns, index=[*cells])
-    values = [np.asarray(each, float)[np.isfinite(each)] for each in cells.values()]
-    table["skewness"] = [stats.skew(each) if np.ptp(each) else 0.0 for each in values]
-    means = np.array([each.mean() for each in values])
+    values, columns = [np.asarray(each, float) for each in cells.values()], {}
+    for sign, name in ((1, "p"), (-1, "opposite_p")):
+        tests = [tests_over_tasks(sign * each, 0.0) for each in values]
+        for number, suffix in enumerate(("", "_without")):
+            columns[name + suffix] = np.array(holm([pair[number].p for pair in tests], len(cells)))
+    columns["skewness"] = [stats.skew(each) if np.ptp(each) else 0.0 for each in values]
+    means, levels = (np.array([of(each) for each in values]) for of in (np.mean, level_of))
+    sure = []
     for name, suffix in (("all_tasks", ""), ("without", "_without")):
-        holds = (means > 0) & (table["p" + suffix] < LEVEL)
-        turns = (means < 0) & (table["opposite_p" + suffix] < LEVEL)
-        table[name] = np.select([holds, turns], ["holds", "reversed"], "open")
-    p, p_without = (
-        np.where(means > 0, table["p" + suffix], table["opposite_p" + suffix])
-        for suffix in ("", "_without")
-    )
-    levels = [level_of(each) for each in values]
-    is_sure = np.fmax(p, p_without) < levels
-    table["verdict"] = table.all_tasks.where((table.all_tasks == table.without) & is_sure, "open")
-    is_sure = two_sided_tests(dict(enumerate(values))).differs
-    table["verdict_two_tailed"] = np.where(
-        is_sure, np.where(means > 0, "holds", "reversed"), "open"
-    )
-    return table
+        p, opposite_p = columns["p" + suffix], columns["opposite_p" + suffix]
+        sides = (means > 0) & (p < LEVEL), (means < 0) & (opposite_p < LEVEL)
+        columns[name] = np.select(sides, ["holds", "reversed"], "open")
+        sure.append(np.where(means > 0, p, opposite_p))
+    is_sure = (columns["all_tasks"] == columns["without"]) & (np.fmax(*sure) < levels)
+    columns["verdict"] = np.where(is_sure, columns["all_tasks"], "open")
+    return pd.DataFrame(columns, index=[*cells])
+
+
+def two_tailed_verdicts(cells):
+    """Return the verdicts that two-tailed tests would give: a description, not registered."""
+    tests = two_sided_tests(cells)
+    verdicts = np.where(tests["mean"] > 0, "holds", "reversed")
+    return pd.Series(np.where(tests.differs, verdicts, "open"), tests.index)
 
 
 EXPECTED = {"h": "holds", "r": "reversed", "o": "open"}
@@ -280,7 +275,7 @@ def tabulate(runs, leans):
 
     A group is a family with values for at least three tasks, or a task of the paper.
     """
-    rows = []
+    rows, by_task = [], dict([*runs.groupby(["world", "task"], sort=False)])
     for claim in CLAIMS:
         found = (values_of_pairs(leans, claim) if claim.endswith(("leans", "lean"))
                  else values_of(runs[runs.world != LONG.name], claim))  # fmt: skip
@@ -293,8 +288,8 @@ def tabulate(runs, leans):
             if group in FAMILIES and len(values) >= 3:
                 cells[world, group], counted[world, group] = values.to_numpy(float), row
             elif group not in FAMILIES:
-                rows.append(row | of_paper(claim, world, group, runs, leans).columns("value"))
-        judged = verdicts(cells)
+                rows.append(row | of_paper(claim, (world, group), by_task, leans).columns("value"))
+        judged = verdicts(cells).assign(verdict_two_tailed=two_tailed_verdicts(cells))
         for key, row in counted.items():
             answer = CLAIMS[claim]["expected"][key[0]][FAMILIES.index(key[1])]
             values = cells[key]
@@ -308,15 +303,18 @@ def tabulate(runs, leans):
     return table.set_index((table.claim + " " + table.world + " " + table.group).rename("row"))
 
 
-def of_paper(claim, world, task, runs, leans):
-    """Return a claim's value on a task of the paper, with its interval over runs.
+def of_paper(claim, key, by_task, leans):
+    """Return a claim's value in a world on a task of the paper, with its interval over runs.
+
+    ``by_task`` contains the runs by ``key``, the world and the task.
 
     The interval of a difference of two leans is computed from the intervals of both, by the method
     of Zou and Donner (2008).
     """
     if claim.endswith(("leans", "lean")):
         part = "joints" if claim == "joints-lean" else "all"
-        mine = leans[(leans.world == world) & (leans.pair == task) & (leans.part == part)]
+        world, pair = key
+        mine = leans[(leans.world == world) & (leans.pair == pair) & (leans.part == part)]
         mine = mine.set_index("method")
         one = mine.loc[LEARNER]
         if claim == "joints-lean":
@@ -326,7 +324,7 @@ def of_paper(claim, world, task, runs, leans):
         down = np.hypot(one.lean - one.lean_low, other.lean_high - other.lean)
         up = np.hypot(one.lean_high - one.lean, other.lean - other.lean_low)
         return Estimate(value, value - down, value + up)
-    used = with_failures(runs[(runs.world == world) & (runs.task == task)])
+    used = with_failures(by_task[key])
     used = used.assign(share=shares(used, claim)).dropna(subset="share")
     first, second = BETTER.get(claim, (LEARNER, RANDOM))
     return difference_of_means(

@@ -13,7 +13,6 @@ from coartic import CoarticError, MotionModel, execute, execute_noisy, load_task
 from coartic.baselines.optimum import OptimumSearch
 from coartic.motion.execution import corrective_trial, other_arm_travel
 from coartic.runs.plan import reference_seed
-from coartic.runs.shipped import open_shipped
 from coartic.runs.store import open_store
 from coartic.tasks import optima
 from coartic.tasks.families import shipped_families
@@ -83,8 +82,8 @@ def test_what_is_shipped_holds(entry):
 
 
 @pytest.mark.parametrize("suite", ["comparison", "families"])
-def test_no_shipped_run_exceeds_a_bound(suite):
-    with open_shipped(suite) as store:
+def test_no_shipped_run_exceeds_a_bound(suite, shipped_folder):
+    with open_store(shipped_folder / suite) as store:
         best = store.runs().groupby("task").reward.max()
     entries = (ENTRIES[name, *SHIPPED.FREE] for name in best.index)
     assert all(e["bound"] >= e["reward"] >= best[e["task"]] for e in entries)

@@ -196,7 +196,7 @@ def reaches(rng, studies, share=0.0, block=0.0, shared=0.0, people=7, repeats=3)
     return contexts
 
 
-@pytest.mark.parametrize("block", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("block", [0.1, 0.2])
 def test_without_carry_over_the_test_keeps_its_level(block):
     """Level 6/128 with a shift between blocks that start and end share; of 400 studies at most
     7.9 % (three standard errors). With a person's own starts the shift is carry-over."""
@@ -208,7 +208,7 @@ def test_without_carry_over_the_test_keeps_its_level(block):
     few = {contrast: contexts[contrast] for contrast in range(300)}
     own = values_of(few, own=True)
     assert own.mean() > values.mean() + 0.5 * block**2
-    assert block < 0.1 or share_rejected(own) > 0.079
+    assert share_rejected(own) > 0.079
 
 
 def test_a_planted_carry_over_is_found_and_a_shift_that_all_share_as_well():

@@ -70,10 +70,13 @@ def effect(rows, name, noise, task, replaced=""):
     return values
 
 
+@pytest.fixture(scope="module")
+def effects(stored):
+    return STUDY.tabulate_effects(STUDY.measure_runs(STUDY.stored(stored))).reset_index()
+
+
 @pytest.mark.parametrize("name", WEIGHTS)
-def test_effects_are_those_of_plain_arithmetic_on_the_rows(name, stored, rows):
-    runs = STUDY.measure_runs(STUDY.stored(stored))
-    table = STUDY.tabulate_effects(runs).reset_index()
+def test_effects_are_those_of_plain_arithmetic_on_the_rows(name, effects, rows):
     for noise in PROTOCOLS.NOISES:
         for settings, replaced in STUDY.SETTINGS.items():
             by_task = [
@@ -86,9 +89,8 @@ def test_effects_are_those_of_plain_arithmetic_on_the_rows(name, stored, rows):
                 "two-armed": statistics.mean(by_task[2:]),
                 "ascending": statistics.mean(effect(rows, name, noise, "ascending", replaced)),
             }
-            here = table[
-                (table.motor_noise == noise) & (table.settings == settings) & (table.effect == name)
-            ]
+            here = effects[(effects.motor_noise == noise) & (effects.settings == settings)]
+            here = here[here.effect == name]
             found = here.set_index("group").points
             assert {group: found[group] for group in due} == pytest.approx(due)
 

@@ -65,7 +65,7 @@ def test_verdicts():
         "ahead": "holds", "behind": "reversed", "nothing": "open", "one": "open", "equal": "open"
     }  # fmt: skip
     assert found.without["one"] == "open"
-    assert [*found.verdict_two_tailed] == ["holds", "reversed", "open", "open", "open"]
+    assert [*STUDY.two_tailed_verdicts(cells)] == ["holds", "reversed", "open", "open", "open"]
     alone = STUDY.verdicts({"skewed": skewed})
     many = STUDY.verdicts(dict.fromkeys(range(30), skewed))
     assert (many.p >= alone.p.iloc[0]).all()  # Holm
