@@ -359,7 +359,8 @@ def ranked_as(runs: pd.DataFrame) -> pd.Series:
     condition for tasks with one arm and another condition for tasks with two arms
     (:data:`RANKED_TOGETHER`). If both conditions have runs with default parameters, but no task in
     common, the two conditions share a row, and these runs get the name of this row
-    (:func:`joined_label`). The result has the index of ``runs``.
+    (:func:`joined_label`). Of several conditions for two arms, the first that fits is used. The
+    result has the index of ``runs``.
     """
     tasks = {label: {*of_method.task} for label, of_method in runs.groupby("label")}
     names = runs.label

@@ -323,8 +323,8 @@ def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
     """Return a dict that maps each row of the ranking to its runs on tasks with targets.
 
     The keys are those of :func:`.runs_by_method`. The tasks are those of :func:`.ranked_tasks` that
-    have targets (:func:`target_ranges`). Rows of the ranking without a run on one of these tasks
-    are left out. The dict is cached: do not change it.
+    have targets (:func:`target_ranges`). Only rows of the ranking that have runs on all these
+    tasks are included. The dict is cached: do not change it.
     """
     tasks = [task for task in ranked_tasks(study) if task in target_ranges(study)]
     of_methods = {}

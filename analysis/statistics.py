@@ -358,7 +358,7 @@ def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
 
     ``null`` contains the statistics of the resamples, shape ``(n,)``. A statistic is extreme if it
     is high (alternative ``"greater"``), low (``"less"``), or far from 0 (``"two-sided"``). A
-    statistic that equals the observed statistic, up to rounding, is counted as well.
+    statistic that equals the observed statistic, up to relative rounding, is counted as well.
     """
     if alternative == "two-sided":
         null, observed = np.abs(null), abs(observed)

@@ -269,14 +269,15 @@ class Control(Method):
         with the fewest ticks is extended by the movement to the next goal, until the prefix with
         the fewest ticks is a complete sequence. At a tie, the hand sequence with fewer changes of
         hand comes first, then the first one in alphabetical order. The movement to a goal is
-        simulated once for all sequences that have the same hands up to this goal and at the goals
-        ahead of it.
+        simulated once for all sequences that have the same hands up to this goal and at the next
+        :attr:`goals_ahead` goals.
 
         The result contains a movement for each goal. The details contain
 
         - ``sequences``: number of hand sequences;
         - ``stuck_sequences``: number of sequences in which a hand got stuck during the search;
-        - ``simulated_movements``: number of simulated movements;
+        - ``simulated_movements``: number of movements that were simulated, or found to be out of
+          reach;
         - ``solves``: number of quadratic programmes solved;
         - ``control_steps``: number of control steps of the solution;
         - ``level_1_binds``, ``level_2_binds``: numbers of these control steps in which level 1 and

@@ -94,8 +94,8 @@ class HandController(Controller):
 class NextGoalController(HandController):
     """Move the hand straight towards its goal, and the joints towards the next goal's posture.
 
-    The movement of the hand has priority: the joints move towards the posture only as far as the
-    movement of the hand allows. The memory is the posture, shape ``(dof,)``.
+    The direction of the hand has priority: the change towards the posture does not bend the path of
+    the hand, but can slow the hand. The memory is what :meth:`begin` returns, shape ``(dof,)``.
     """
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:

@@ -43,7 +43,10 @@ _MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError
 
 
 def peak_rss_mib() -> float:
-    """Return the peak resident set size of this process so far (in MiB)."""
+    """Return the peak resident set size of this process so far (in MiB).
+
+    On Linux, the value of a process that was started by exec includes the peak of its parent.
+    """
     unit = 2**20 if sys.platform == "darwin" else 2**10
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 

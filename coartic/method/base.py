@@ -201,9 +201,9 @@ class Method(ABC):
     def refuses(cls, model: MotionModel) -> str | None:
         """Return a sentence on why the method cannot run under a motion model, or None.
 
-        The sentence names the first constant in :data:`.WORLD` that differs from the paper's and to
-        which the method does not adapt (:attr:`adapts_to`). Other constants of the motion model are
-        not looked at.
+        The sentence names the first of the constants ``norm`` and ``base_weight`` that differs from
+        the paper's and to which the method does not adapt (:attr:`adapts_to`). Other constants of
+        the motion model, such as the motor noise, are never a reason.
         """
         adapts_to = cls.adapts_to
         if adapts_to is None:

@@ -449,7 +449,8 @@ def execute_noisy(
         K solutions of the task, as a list even if there is only one.
     motor_noise : float
         Standard deviation s of the noise, from 0 to 100, in length units (base) and rad (joints).
-        If it is 0, the ticks are the same as in :func:`coartic.execute`.
+        If it is 0, the ticks are the same as in :func:`coartic.execute`, unless the target of a
+        corrective movement contains NaN (see Notes).
     repeats : int
         Number R of executions of each solution, from 1 to 1,000,000.
     seed : int or iterable of int
@@ -501,15 +502,15 @@ def execute_noisy(
       by more than 1e-9 from where the robot stands now. A locked base does not move.
     - The target of a *correction* is the configuration a that the corrective process finds from q.
       L is the Euclidean distance from q to a. A locked base coordinate ends at a_c.
-    - With ``signal_dependent`` all three rows have s min(1, L) instead of s. L is then the
+    - With ``signal_dependent`` the first two rows also have s min(1, L) instead of s. L is then the
       Euclidean distance from q to the target without noise (for a path, to its last waypoint).
     - The noisy target takes the place of the target everywhere: for the hit, for the arrival of an
       aimed movement, and for the tick that the arrival costs.
     - If the solution contains a corrective movement with a target, this target is compared with the
       configuration that the corrective process finds in the execution without noise. If they differ
-      by more than 1e-9 in a coordinate, or if the process does not converge, the movement is
-      treated as an aimed movement, which ends on a hit or at its target. Otherwise it is treated as
-      a correction, and its stored target is not used.
+      by more than 1e-9 in a coordinate, where NaN is not compared, or if the process does not
+      converge, the movement is treated as an aimed movement, which ends on a hit or at its target.
+      Otherwise it is treated as a correction, and its stored target is not used.
     - z is a function of the seed, the number of the execution, the goal, the number of the movement
       made for this goal and the coordinate (:mod:`coartic.motion.kernels.noise`).
 

@@ -74,8 +74,9 @@ def goal_record_type(width: int) -> np.dtype[np.void]:
 def set_off(run: RunRecord, q: Any, seed: Any, draw: Any, robot: RobotRecord) -> None:
     """Start the trial of a run at configuration ``q``, shape ``(dof,)``, in place.
 
-    ``going`` becomes True, and ``evaluations`` becomes 0. With motor noise, ``world`` becomes the
-    key of draw ``draw`` of the noise with the 64-bit seed ``seed``. All other fields do not change.
+    ``q`` is copied into the run, ``going`` becomes True, and ``evaluations`` becomes 0. With motor
+    noise, ``world`` becomes the hash of ``seed`` (64-bit seed of the noise) and ``draw`` (number of
+    the noise draw). All other fields do not change.
     """
     fill_row(run.q, q)
     run.going, run.evaluations = True, 0
