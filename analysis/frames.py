@@ -348,8 +348,7 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     frame : DataFrame
         A row for each run, with columns ``reward``, ``best_known`` and ``corrective_best``, in
         negative ticks. ``corrective_best`` is the reward of the corrective process alone with its
-        best hands. (For a task with more than 4,096 hand sequences, column ``corrective_best`` of
-        ``load(folder).runs`` contains the reward with the task's initial hands instead.) For runs
+        best hands; :attr:`.Study.corrective_best` has the exceptions. For runs
         in a world with motor noise, the columns are as in :func:`relative_gaps`.
 
     Returns
@@ -358,10 +357,11 @@ def shares(frame: pd.DataFrame) -> pd.Series:
         (value - corrective_best) / (best_known - corrective_best) as a fraction, with the index of
         ``frame``. The value of a run is its reward or minus its mean ticks
         (:func:`relative_gaps`). The share is negative if the corrective process alone is better
-        than the run. It is NaN if one of the three numbers is NaN, or if nothing can be gained.
-        Nothing can be gained if the best known reward is not above ``corrective_best`` or, in a
-        world with noise, if it is above ``corrective_best`` by less than 1 % of the best known
-        reward, on average over the runs with this best known reward.
+        than the run. It is NaN if one of the three numbers is NaN, or if nothing can be gained:
+
+        - the best known reward of the run is not above its ``corrective_best``;
+        - in a world with noise: the mean of ``best_known - corrective_best`` over all runs with the
+          same best known reward is less than 1 % of this best known reward.
 
     Raises
     ------

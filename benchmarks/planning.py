@@ -322,7 +322,8 @@ def _asked_tasks(
     Raises
     ------
     CoarticError
-        A file cannot be used, a name is unknown, or a task has the name of another task.
+        A file cannot be used, a family is unknown, or a task has the name of another task. Whether
+        other names are tasks of the suite is not checked.
     """
     for path in request.family_files:
         check_kind(str(path), "family")

@@ -347,7 +347,9 @@ def for_page(plot: Plot) -> str:
 
 
 def _with_short_lines(path: str) -> str:
-    """Return an SVG path in which lines have relative instead of absolute coordinates.
+    """Return an SVG path in which lines after a move have relative coordinates.
+
+    Lines after curves stay absolute.
 
     The coordinates of the path must have at most one decimal.
 

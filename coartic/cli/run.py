@@ -228,7 +228,7 @@ def list_(
 
 
 def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
-    """Yield a description of a suite, as pairs of a word and a sentence (:func:`.say_pairs`).
+    """Yield a description of a suite, as pairs of a heading and a text (:func:`.say_pairs`).
 
     ``name`` is the name of the suite or the path of its file.
     """
@@ -248,7 +248,7 @@ def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
 
 
 def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
-    """Yield a description of a task, as pairs of a word and a sentence (:func:`.say_pairs`).
+    """Yield a description of a task, as pairs of a heading and a text (:func:`.say_pairs`).
 
     ``name`` is the name of the task or the path of its file, as the user wrote it.
     """
@@ -276,7 +276,7 @@ def _list_runs(folder: Path) -> None:
 
 
 def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
-    """Yield a description of a family, as pairs of a word and a sentence (:func:`.say_pairs`).
+    """Yield a description of a family, as pairs of a heading and a text (:func:`.say_pairs`).
 
     ``name`` is the name of the family or the path of its file.
     """
@@ -286,7 +286,7 @@ def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
 
 
 def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
-    """Yield a description of a method, as pairs of a word and a sentence (:func:`.say_pairs`)."""
+    """Yield a description of a method, as pairs of a heading and a text (:func:`.say_pairs`)."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
     from coartic.runs.plan import describe_parameters

@@ -109,7 +109,7 @@ def _wrap(text: str, width: int) -> list[str]:
 
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
-    """Print pairs of a word and a sentence in two columns.
+    """Print pairs of a heading and a text in two columns.
 
     The second column is wrapped to the width of the terminal (:func:`_wrap`).
     """

@@ -93,7 +93,9 @@ class LearningRun:
 
     @property
     def next_action(self) -> tuple[Movement, ...]:
-        """Movements that the learner would make in a next trial without exploration.
+        """Movements that the learner would choose in a next trial without exploration.
+
+        Corrective movements after a miss are not included.
 
         The state at a goal is the pair of this goal and the hand for the previous goal.
 

@@ -379,11 +379,12 @@ def _segment_length(run: RunRecord, waypoints: Any, k: int, model: Any) -> float
 def follow(run: RunRecord, waypoints: Any, robot: RobotRecord, slots: SlotArrays) -> None:
     """Move a run along a path, until its hand hits or the path ends.
 
-    ``waypoints`` has shape ``(W, dof)``. The path has n = ceil(length / m) steps. Point k < n lies
-    at arc length k m, and point n is the last waypoint. With noise, one displacement is drawn, and
-    waypoint k of W (from 1) is displaced by k / W times that displacement, in the coordinates that
-    any waypoint moves. ``q``, ``hit`` and ``ticks`` of the run are set, and ``evaluations`` grows
-    by one for each point up to the end of the movement. Slot 0 is work space.
+    ``waypoints`` has shape ``(W, dof)``. The path has n = ceil(length / m) steps of length m, the
+    model's step. Point k < n lies at arc length k m, and point n is the last waypoint. With noise,
+    one displacement is drawn, and waypoint w of W (from 1) is displaced by w / W times this
+    displacement. Coordinates that no waypoint changes are not displaced. ``q``, ``hit`` and
+    ``ticks`` of the run are set, and ``evaluations`` grows by one for each point up to the end of
+    the movement. Slot 0 is work space.
     """
     model, last = robot.model, len(waypoints) - 1
     noisy = model.motor_noise > 0.0
