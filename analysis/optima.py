@@ -161,7 +161,7 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
         ``task`` and ``free`` (no restriction), even if the method has parameters with these names.
     """
     default = {"base": BASE, "other_arm": "free"}
-    pairs = [*zip(runs.method, runs.parameters, strict=True)]
+    pairs = [*zip(runs.method.tolist(), runs.parameters.tolist(), strict=True)]
     asked = {
         (method, text): default | (json.loads(text) if method in SEARCHES else {})
         for method, text in {*pairs}

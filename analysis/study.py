@@ -69,7 +69,7 @@ frame contains this dict in ``attrs["units"]``."""
 
 def _labelled(stored: pd.DataFrame) -> pd.DataFrame:
     """Return stored runs with the columns ``label`` and ``ranked_as`` of :attr:`Study.runs`."""
-    runs = stored.assign(label=[*map(label_of, stored.method, stored.setting)])
+    runs = stored.assign(label=[*map(label_of, stored.method.tolist(), stored.setting.tolist())])
     return runs.assign(ranked_as=ranked_as(runs))
 
 
@@ -230,12 +230,12 @@ class Study:
             return {names[0]: self}
         labelled = _labelled(self.stored)
         methods, studies = methods_of(labelled, self.declared, self.marks), dict[str, Study]()
+        with_runs = {*labelled.label}
         for world in names:
             plan = [job for job in self.plan if job.cell.world == world]
             here = {job.cell.label for job in plan}
             used = {job.cell.method.name for job in plan}
-            others = [label for label in methods.index if label not in here]
-            others = [label for label in others if label in {*labelled.label}]
+            others = [label for label in methods.index if label in with_runs - here]
             studies[world] = Study(
                 self.folder,
                 plan,

@@ -141,8 +141,9 @@ def missing_entries(runs: pd.DataFrame) -> Iterator[str]:
     ``runs`` are the shipped runs. A sentence has the entry that is missing in :data:`SHORT_RUNS` or
     :data:`FAMILIES`.
     """
+    known = {*runs.method, *SHORT_RUNS}
     for name, info in built_in().items():
-        if name not in {*runs.method, *SHORT_RUNS}:
+        if name not in known:
             tasks = ("two-armed-2", "ascending")
             task = next(task for task in tasks if info.inapplicable_reason(load_task(task)) is None)
             yield f'{name} has no shipped run: add "{name}": {short_run(name, task)} to SHORT_RUNS'

@@ -196,18 +196,17 @@ def reaches(rng, studies, share=0.0, block=0.0, shared=0.0, people=7, repeats=3)
     return contexts
 
 
-@pytest.mark.parametrize("block", [0.1, 0.2])
-def test_without_carry_over_the_test_keeps_its_level(block):
+def test_without_carry_over_the_test_keeps_its_level():
     """Level 6/128 with a shift between blocks that start and end share; of 400 studies at most
     7.9 % (three standard errors). With a person's own starts the shift is carry-over."""
-    contexts = reaches(np.random.default_rng(17), 400, block=block)
+    contexts = reaches(np.random.default_rng(17), 400, block=0.2)
     values = values_of(contexts)
     assert values.shape == (400, 7)
     assert abs(values.mean()) < 0.01
     assert 0.015 < share_rejected(values) < 0.079
     few = {contrast: contexts[contrast] for contrast in range(300)}
     own = values_of(few, own=True)
-    assert own.mean() > values.mean() + 0.5 * block**2
+    assert own.mean() > values.mean() + 0.02
     assert share_rejected(own) > 0.079
 
 
