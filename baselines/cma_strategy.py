@@ -238,7 +238,7 @@ class EvolutionStrategy:
             self._best, self._best_point = float(costs[least]), self._generation * self.size
             self._best_point += least + 1 - self.size
         self._costs = ranked = np.sort(costs)
-        self._best_costs.appendleft(ranked[0])
+        self._best_costs.appendleft(float(ranked[0]))
         if self._generation % _HISTORY_STEP == 0:
             self._long_best.appendleft(ranked[0])
             self._long_median.appendleft(np.median(ranked))

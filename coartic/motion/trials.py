@@ -109,8 +109,10 @@ def noise_draws(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
     :attr:`Requests.worlds`. ``seeds`` (from :func:`noise_seed`) and ``draws`` are integers, or
     arrays of shape ``(N,)``.
     """
-    pairs = np.broadcast_arrays(np.asarray(seeds, np.uint64), np.asarray(draws, np.uint64))
-    return np.stack(np.atleast_1d(*pairs), axis=1)
+    columns = np.asarray(seeds, np.uint64), np.asarray(draws, np.uint64)
+    rows = np.empty((max(column.size for column in columns), 2), np.uint64)
+    rows[:, 0], rows[:, 1] = columns
+    return rows
 
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> TrialRecords:
@@ -496,5 +498,6 @@ def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
             f"{pluralize(count, 'trial')}; it must have one for each"
         )
     rows = np.empty((count, len(task.goals)), dtype=np.int64)
-    rows[:] = np.reshape([codes[sequence] for sequence in sequences], (-1, len(task.goals)))
+    if sequences:
+        rows[:] = [codes[sequence] for sequence in sequences]
     return rows
