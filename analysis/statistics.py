@@ -268,7 +268,10 @@ def _p_of(
     """
     if exact:
         resamples = math.comb(sum(map(np.size, strata[0])), np.size(strata[0][0]))
-    rng = np.random.default_rng(SEED)
+    sampled = [pair for pair in strata if not all(isinstance(part, float) for part in pair)]
+    sizes = tuple(map(_sizes_of, sampled))
+    is_cached = resamples * sum(chosen for _, chosen in sizes) <= _MAX_INDICES
+    drawn = iter((_kept_places if is_cached else _places_by_stratum)(sizes, resamples, exact))
     observed, null, size = np.zeros((2, 1)), np.zeros((2, resamples)), 0.0
     for first, second in strata:
         if isinstance(first, float) and isinstance(second, float):
@@ -276,21 +279,14 @@ def _p_of(
             continue
         if isinstance(first, float) or isinstance(second, float):
             values = np.ravel(first - second)
-            pool, n, chosen = centred(values), len(values), len(values)
+            pool, n = centred(values), len(values)
             observed[0] += values.mean()
             observed[1] += pool.var(ddof=1) / n
         else:
             pool, n = centred(np.concatenate([first, second])), len(first)
-            chosen = min(n, len(second))
             observed += _moments(pool, np.arange(n)[None], n)
         size += float(np.abs(pool).max())
-        is_cached = len(strata) == 1 and resamples * chosen <= _MAX_INDICES
-        chunks = (
-            _kept_places(len(pool), chosen, resamples, exact)
-            if is_cached
-            else places(len(pool), chosen, resamples, exact, rng)
-        )
-        for part, rows in chunks:
+        for part, rows in next(drawn):
             null[:, part] += _moments(pool, rows, n)
     (statistic,) = _studentised(observed, size)
     extreme = _extreme(_studentised(null, size), statistic, alternative)
@@ -400,15 +396,38 @@ def places(
             yield part, drawn_rows(runs, chosen, size, rng)
 
 
+def _sizes_of(stratum: tuple[Array | float, Array | float]) -> tuple[int, int]:
+    """Return the number of values in a stratum, and the number of indices in a resample of it.
+
+    If the stratum has only one sample (and an exact number), the two numbers are equal. If it has
+    two samples, the second number is the size of the smaller sample.
+    """
+    sizes = [np.size(sample) for sample in stratum if not isinstance(sample, float)]
+    return sum(sizes), min(sizes)
+
+
+def _places_by_stratum(
+    sizes: tuple[tuple[int, int], ...], resamples: int, exact: bool
+) -> Iterator[Iterator[tuple[slice, NDArray[np.int32]]]]:
+    """Yield, for each stratum, an iterator of the chunks of :func:`places`.
+
+    All strata are drawn by one generator with :data:`.SEED`, so the chunks of a stratum must be
+    used before those of the next. ``sizes`` contains a pair of :func:`_sizes_of` for each stratum.
+    """
+    rng = np.random.default_rng(SEED)
+    for runs, chosen in sizes:
+        yield places(runs, chosen, resamples, exact, rng)
+
+
 @lru_cache(maxsize=16)  # many samples have the same numbers of values
 def _kept_places(
-    runs: int, chosen: int, resamples: int, exact: bool
-) -> list[tuple[slice, NDArray[np.int32]]]:
-    """Return the chunks of :func:`places` as a list, drawn by a new generator with :data:`.SEED`.
+    sizes: tuple[tuple[int, int], ...], resamples: int, exact: bool
+) -> list[list[tuple[slice, NDArray[np.int32]]]]:
+    """Return a list of the chunks of each stratum (:func:`_places_by_stratum`).
 
-    The list is cached: do not change it.
+    The lists are cached: do not change them.
     """
-    return [*places(runs, chosen, resamples, exact, np.random.default_rng(SEED))]
+    return [[*chunks] for chunks in _places_by_stratum(sizes, resamples, exact)]
 
 
 def share_test(count: _Count, total: _Count, share: _Share, alternative: Alternative) -> Estimate:
