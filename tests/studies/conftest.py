@@ -14,7 +14,7 @@ from tests.support.suites import unpacked
 def _fewer_resamples_of_claims():
     """On which no verdict of a test depends."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judging, "RESAMPLES_OF_CLAIMS", 9_999)
+        patch.setattr(judging, "RESAMPLES_OF_CLAIMS", 4_999)
         yield
 
 
