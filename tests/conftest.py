@@ -8,7 +8,7 @@ import sys
 from functools import cache
 
 import pytest
-from hypothesis import settings
+from hypothesis import given, settings, strategies
 
 from coartic.internal.threads import worker_variables
 
@@ -38,6 +38,12 @@ def _kernels():
         from coartic.learner.learning import warm_up
 
         warm_up(load_task("ascending"))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _first_example():
+    """Hypothesis looks for garbage among all objects before its first example: now they are few."""
+    given(strategies.none())(lambda _: None)()
 
 
 @pytest.fixture(scope="session", autouse=True)
