@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 
 from coartic import CONDITIONS, Movement, execute, learn, load_task
 from coartic.analysis import solutions_of
@@ -257,6 +256,8 @@ def test_the_link_holds_the_whole_state(opened):
 
 
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened):
+    from axe_playwright_python.sync_playwright import Axe
+
     page = opened()
     for width, scheme, state in (
         (1280, "light", "drift=0.03&reward=movement"), (390, "dark", "preset=4&who=you")
