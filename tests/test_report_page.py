@@ -3,8 +3,6 @@
 from functools import partial
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import expect
 
 from coartic.analysis.control import shared_goal
 from coartic.analysis.study import solved, typical_run
@@ -55,6 +53,8 @@ def part(page, name):
 
 
 def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, traced):
+    from playwright.sync_api import expect
+
     page = opened(reduced_motion="reduce")
     shared = shared_goal(traced)
     difference = f"{float(f'{shared.posture_difference:.2f}'):g}"
@@ -82,6 +82,8 @@ def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, tra
 
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened):
     """On a phone the panels of a figure are drawn one by one, instead of side by side."""
+    from axe_playwright_python.sync_playwright import Axe
+
     page = opened(reduced_motion="reduce")
     page.evaluate(OPEN_ALL)
     for width in (1280, 390):

@@ -3,7 +3,6 @@
 import math
 
 import clarabel
-import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
@@ -26,6 +25,8 @@ class Programme:
     """
 
     def __init__(self, problem, parameter, variables, values):
+        import cvxpy as cp  # slow to import, and needed for proofs alone
+
         parameter.value = _PLANTED + np.arange(values.size, dtype=float).reshape(values.shape)
         data, _, _ = problem.get_problem_data(cp.CLARABEL, canon_backend=cp.SCIPY_CANON_BACKEND)
         self._places = []  # data, positions in them, and indices of the parameter's numbers there

@@ -18,7 +18,6 @@ either hand is within a disc around the middle of the shoulders, and both arms m
 import math
 from typing import NamedTuple
 
-import cvxpy as cp
 import numpy as np
 from lagrangian import Lagrangian, least
 from programme import MAX_MULTIPLIER, Programme, finite
@@ -100,6 +99,8 @@ class Relaxation:
 
     def state(self):
         """Return the CVXPY problem, its parameter (the half-spaces), and its variables q and u."""
+        import cvxpy as cp  # slow to import, and needed for proofs alone
+
         goals, links = len(self._radii), len(self._lengths)
         q, u, distances = cp.Variable(self.held.shape), cp.Variable((links, 2)), cp.Variable(goals)
         changes = q - cp.vstack([self._q0[None], q[:-1]])
