@@ -51,7 +51,6 @@ from coartic.motion.kernels.compile import (
 )
 from coartic.motion.kernels.correct import (
     correct_runs,
-    correct_runs_informed,
     correct_slots,
     project,
 )
@@ -245,7 +244,7 @@ def workspace_for(runs: int, task: Task) -> _Workspace:
     )
 
 
-@inlined
+@inner
 def distance_to_goal(run: RunRecord, hand: int, robot: RobotRecord, workspace: _Workspace) -> float:
     """Return the distance of a run's hand (0 left, 1 right) from its goal's centre.
 
@@ -481,10 +480,8 @@ def make_trial(
             records[n, number].moved = batch.runs[n].ticks
             if batch.runs[n].action == MOVE:
                 fill_row(records[n, number].target, batch.runs[n].target)
-        if initial or learner.nullspace_correction_gain == 0.0:
-            correct_runs(runs, robot, batch)
-        else:
-            correct_runs_informed(runs, robot, batch)
+        informed = not initial and learner.nullspace_correction_gain != 0.0
+        correct_runs(runs, informed, robot, batch)
         for n in range(runs):
             record_goal(batch.runs[n], records[n, number].moved, records[n, number])
             count_goal(records[n, number], counts[n])

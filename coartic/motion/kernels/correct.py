@@ -226,15 +226,13 @@ def correct_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
     descend_to_goals(batch, count, robot, None)
 
 
-@inlined
-def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> int:
-    """Let a corrective process set the ``target`` of each run to which it applies.
+@inner
+def _load_missed(count: int, robot: RobotRecord, batch: Batch) -> int:
+    """Load each run that is to be corrected into a slot, and return the number of these runs.
 
-    The process applies to each of the first ``count`` runs that has missed its goal, whose trial
-    goes on, and that may be corrected (``corrects``). ``descend`` is the kernel of the process
-    **A**. The field ``converged`` of a run becomes True if **A** applied and converged, and False
-    otherwise. ``iterations`` grows by the iterations of **A**. Return the number of runs to which
-    the process applied.
+    These are the runs among the first ``count`` that have missed their goal, whose trial goes on,
+    and that may be corrected (``corrects``). ``acting`` becomes True for them, and False for other
+    runs. ``converged`` becomes False, and the ``target`` of a loaded run its configuration.
     """
     slots, slot = batch.slots[0], 0
     for i in range(count):
@@ -244,18 +242,36 @@ def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> int:
             fill_row(run.target, run.q)
             load(slots, slot, i, run, arm_of(robot, run.hand))
             slot += 1
-    applied = slot
-    descend(batch, slot, robot)
-    return applied
+    return slot
+
+
+@inner
+def _aim_converged(count: int, robot: RobotRecord, batch: Batch) -> None:
+    """Set the ``end`` of the next movement of each of the first ``count`` runs that has converged.
+
+    The ``end`` is the ``target``, displaced by motor noise. ``acting`` becomes True for these runs,
+    and False for other runs. ``corrections`` grows. ``corrects`` becomes False for a run that has
+    not converged: if it was corrected, its trial has failed.
+    """
+    for i in range(count):
+        run = batch.runs[i]
+        run.acting = run.converged
+        run.corrects = run.converged
+        run.spent, run.corrections = run.ticks, run.corrections + run.converged
+        if run.converged and robot.model.motor_noise > 0.0:
+            miss_correction(run, robot)
+        elif run.converged:
+            fill_row(run.end, run.target)
 
 
 @inlined
-def _correct_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None:
+def correct_runs(count: int, informed: bool, robot: RobotRecord, batch: Batch) -> None:
     """Correct the first ``count`` runs: phase 4, *correct*.
 
-    A run is corrected only if it has missed its goal. The process **A**, kernel ``descend``, looks
-    for a configuration that hits the goal, and the robot moves to this configuration. The movement
-    ends as soon as the hand is in the goal.
+    A run is corrected only if it has missed its goal. The process **A** looks for a configuration
+    that hits the goal, and the robot moves to this configuration. The movement ends as soon as the
+    hand is in the goal. If ``informed`` is True, **A** makes null-space steps
+    (:func:`correct_slots_informed`), otherwise not (:func:`correct_slots`).
 
     - Without noise, a run is corrected once.
     - With noise, the movement can miss the goal. Then the run is corrected again, until it hits the
@@ -269,42 +285,20 @@ def _correct_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> N
     for i in range(count):
         run = batch.runs[i]
         run.ticks, run.corrections, run.iterations = 0, 0, 0
-    noisy = robot.model.motor_noise > 0.0
-    for _ in range(MAX_CORRECTIONS if noisy else 1):
-        if _find_by(count, robot, batch, descend) == 0:
+    for _ in range(MAX_CORRECTIONS if robot.model.motor_noise > 0.0 else 1):
+        missed = _load_missed(count, robot, batch)
+        if missed == 0:
             break
-        for i in range(count):
-            run = batch.runs[i]
-            run.acting = run.converged
-            run.corrects = run.converged  # if A does not converge, the trial has failed
-            run.spent, run.corrections = run.ticks, run.corrections + run.converged
-            if run.converged and noisy:
-                miss_correction(run, robot)
-            elif run.converged:
-                fill_row(run.end, run.target)
+        if informed:
+            correct_slots_informed(batch, missed, robot)
+        else:
+            correct_slots(batch, missed, robot)
+        _aim_converged(count, robot, batch)
         move_acting(count, False, robot, batch)
         for i in range(count):
             run = batch.runs[i]
             if run.acting:
                 run.ticks += run.spent
-
-
-@shared
-def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Correct runs that missed their goal (:func:`_correct_by`).
-
-    The process is the paper's corrective process (:func:`correct_slots`).
-    """
-    _correct_by(count, robot, batch, correct_slots)
-
-
-@shared
-def correct_runs_informed(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Correct runs that missed their goal, with null-space steps (:func:`_correct_by`).
-
-    The process is that of :func:`correct_slots_informed`.
-    """
-    _correct_by(count, robot, batch, correct_slots_informed)
 
 
 @entry

@@ -271,20 +271,30 @@ def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotReco
                 break
 
 
-@shared
+@inner
+def _load_acting(count: int, robot: RobotRecord, batch: Batch) -> int:
+    """Load each of the first ``count`` runs that is ``acting`` into a slot, for a movement.
+
+    Return the number of these runs.
+    """
+    slot = 0
+    for i in range(count):
+        if batch.runs[i].acting:
+            start(batch.slots[0], slot, i, batch.runs[i], robot)
+            slot += 1
+    return slot
+
+
+@inlined
 def move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> None:
     """Move each of the first ``count`` runs that is ``acting`` to its ``end``, in place.
 
     A movement ends on a hit or at its ``end``. If ``stops`` is True, a movement also ends when the
     hand is within ``arrival_tolerance`` of the position that it has at ``end``.
     """
-    slots, slot = batch.slots[0], 0
-    for i in range(count):
-        if batch.runs[i].acting:
-            start(slots, slot, i, batch.runs[i], robot)
-            slot += 1
-    if slot > 0:
-        move_slots(batch, slot, stops, robot)
+    acting = _load_acting(count, robot, batch)
+    if acting > 0:
+        move_slots(batch, acting, stops, robot)
 
 
 @inlined
@@ -315,7 +325,7 @@ def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 # ---- Paths ----
 
 
-@inlined
+@inner
 def _corner(run: RunRecord, waypoints: Any, k: int, j: int, noisy: bool) -> Any:
     """Return entry ``j`` of corner ``k`` of a path.
 
@@ -330,7 +340,7 @@ def _corner(run: RunRecord, waypoints: Any, k: int, j: int, noisy: bool) -> Any:
     return waypoints[k, j]
 
 
-@inlined
+@inner
 def _sum_of_squares(
     run: RunRecord, waypoints: Any, k: int, entries: Any, noisy: bool, weight: float
 ) -> float:
@@ -423,7 +433,7 @@ def follow(run: RunRecord, waypoints: Any, robot: RobotRecord, slots: SlotArrays
     run.ticks = step + 1
 
 
-@inlined
+@inner
 def _point(
     run: RunRecord,
     waypoints: Any,

@@ -283,7 +283,7 @@ def load(slots: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) ->
     _copy_arm(slots.q, slot, run.q, arm)
 
 
-@inlined
+@inner
 def squared_distance(run: RunRecord) -> float:
     """Return the squared Euclidean distance from a run's configuration to its target.
 
