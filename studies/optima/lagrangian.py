@@ -14,9 +14,11 @@ by at most the length of the path.
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from coartic.motion.kernels.compile import import_numba
+
+numba = import_numba()  # with the settings of the kernels, which would be compiled anew for others
 _TURN = 2.0 * math.pi
 _PARABOLAS = 4  # steps by which an interval's end moves inwards
 
