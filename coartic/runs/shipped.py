@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import lzma
 from contextlib import AbstractContextManager
+from functools import lru_cache
 from pathlib import Path
 
 import coartic
@@ -40,7 +41,13 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
         )
     if hashlib.sha256(content).hexdigest() != hashes[suite]:
         raise CoarticError(f"{path} was changed after it was shipped: install coartic again")
-    return open_content(lzma.decompress(content), SHIPPED)
+    return open_content(_decompressed(content), SHIPPED)
+
+
+@lru_cache(maxsize=1)  # a report opens the same results several times
+def _decompressed(content: bytes) -> bytes:
+    """Return the decompressed content of a file with shipped results."""
+    return lzma.decompress(content)
 
 
 def open_results(folder: Path) -> AbstractContextManager[Store]:
