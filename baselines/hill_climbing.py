@@ -114,19 +114,20 @@ class HillClimbing(Method):
         since, good = Counter[str](), Counter[str]()  # trials since a spread changed; good ones
         hopeless: set[str] = set()  # sequences that the corrective process does not complete
 
-        def draw() -> str:
+        def draw(best: str) -> str:
             """Draw a hand sequence with which the corrective process has not failed.
 
             With parameter ``sequence`` the result is that sequence. Otherwise all hands are random
-            before the first success. After the first success they are the hands of the best trial,
-            but at each goal, with probability 0.2, the hand is replaced by a random hand.
+            if ``best``, the hand sequence of the best trial, is empty. If it is not, the hands are
+            those of ``best``, but at each goal, with probability 0.2, the hand is replaced by a
+            random hand.
             """
             if given is not None:
                 return given
             while True:
-                chosen = list(attempts.hand_sequence or letters[0] * session.goals_count)
+                chosen = list(best or letters[0] * session.goals_count)
                 for goal in range(len(chosen)):
-                    if not attempts.hand_sequence or rng.random() < _EPSILON:
+                    if not best or rng.random() < _EPSILON:
                         chosen[goal] = letters[rng.integers(len(letters))]
                 if (hand_sequence := "".join(chosen)) not in hopeless:
                     return hand_sequence
@@ -162,16 +163,16 @@ class HillClimbing(Method):
             while attempts.left > 0 and len(hopeless) < sequences:
                 # Draws do not depend on rewards until a centre moves, which is rare, or a spread
                 # changes. So trials are drawn ahead and made side by side, up to the end of a
-                # window. If a trial moves a centre, the later draws are discarded, and the
-                # generator is set back to its state after the draws of this trial.
-                drawn, noise, states = list[str](), list[Array](), [rng.bit_generator.state]
+                # window. If a trial moves a centre, the later draws are discarded: the generator is
+                # set back, and makes the draws up to this trial again.
+                drawn, noise = list[str](), list[Array]()
+                state, best = rng.bit_generator.state, attempts.hand_sequence
                 while len(drawn) < min(ahead, attempts.left):
-                    hand_sequence = draw() if attempts.trials_made else initial_hands
+                    hand_sequence = draw(best) if attempts.trials_made else initial_hands
                     if hand_sequence not in centres:
                         break
                     drawn.append(hand_sequence)
                     noise.append(rng.standard_normal(dim))
-                    states.append(rng.bit_generator.state)
                     if is_learned and since[hand_sequence] + drawn.count(hand_sequence) == window:
                         break
                 if drawn:
@@ -181,7 +182,11 @@ class HillClimbing(Method):
                     targets[:, explored] += scales[:, None] * np.array(noise)
                     attempt = attempts.run_targets(drawn, targets, until=thresholds)
                     tried = len(attempt.rewards)
-                    rng.bit_generator.state = states[tried]
+                    if tried < len(drawn) or hand_sequence not in centres:
+                        rng.bit_generator.state = state
+                        for _ in range(tried):
+                            draw(best)
+                            rng.standard_normal(dim)
                     hand_sequence, ahead = drawn[tried - 1], min(2 * ahead, _MAX_DRAWN_TRIALS)
                     if attempt.rewards[-1] > rewards[hand_sequence]:
                         ahead = tried
