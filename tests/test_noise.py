@@ -338,6 +338,7 @@ def test_trials_of_a_session_are_those_of_the_slow_implementation(name, world):
         for n, (each, rows) in enumerate(zip(hands, targets, strict=True))
     ]
     session = session_in(task, world, 9)
+    assert len(session.trials([], targets[:0]).ticks) == 0
     made = session.trials(hands, targets)
     assert session.rewards == [each.reward for each in due]
     names = ("ticks", "corrections", "iterations")

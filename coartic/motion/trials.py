@@ -110,7 +110,7 @@ def noise_draws(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
     arrays of shape ``(N,)``.
     """
     columns = np.asarray(seeds, np.uint64), np.asarray(draws, np.uint64)
-    rows = np.empty((max(column.size for column in columns), 2), np.uint64)
+    rows = np.empty((np.broadcast(*columns).size, 2), np.uint64)
     rows[:, 0], rows[:, 1] = columns
     return rows
 
