@@ -230,12 +230,13 @@ class Study:
             return {names[0]: self}
         labelled = _labelled(self.stored)
         methods, studies = methods_of(labelled, self.declared, self.marks), dict[str, Study]()
-        with_runs = {*labelled.label}
+        everywhere = {*labelled.label}
         for world in names:
             plan = [job for job in self.plan if job.cell.world == world]
             here = {job.cell.label for job in plan}
             used = {job.cell.method.name for job in plan}
-            others = [label for label in methods.index if label in with_runs - here]
+            elsewhere = everywhere - here
+            others = [label for label in methods.index if label in elsewhere]
             studies[world] = Study(
                 self.folder,
                 plan,

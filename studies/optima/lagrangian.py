@@ -18,7 +18,7 @@ import numpy as np
 
 from coartic.motion.kernels.compile import import_numba
 
-numba = import_numba()  # with the settings of the kernels, which would be compiled anew for others
+numba = import_numba()  # with the kernels' settings; without them the kernels are compiled again
 _TURN = 2.0 * math.pi
 _PARABOLAS = 4  # steps by which an interval's end moves inwards
 

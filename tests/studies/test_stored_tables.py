@@ -25,7 +25,8 @@ make_findings = program(ROOT / "docs" / "make_findings.py")
 RESAMPLED = r"_low$|_high$|\bp\b|^p_|_p$|_p_|verdict|replicates|more_than|without|all_tasks"
 """Columns that depend on the number of resamples, which is smaller in tests."""
 FEW = 99
-"""Resamples in tests of studies, on which no column that is compared depends."""
+"""Resamples in tests of studies. No column that is compared depends on them, but in study worlds,
+which has more."""
 
 
 @pytest.fixture(autouse=True)

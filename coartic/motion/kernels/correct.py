@@ -249,9 +249,10 @@ def _load_missed(count: int, robot: RobotRecord, batch: Batch) -> int:
 def _aim_converged(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Set the ``end`` of the next movement of each of the first ``count`` runs that has converged.
 
-    The ``end`` is the ``target``, displaced by motor noise. ``acting`` becomes True for these runs,
-    and False for other runs. ``corrections`` grows. ``corrects`` becomes False for a run that has
-    not converged: if it was corrected, its trial has failed.
+    The ``end`` is the ``target``, displaced by motor noise. ``acting`` and ``corrects`` become True
+    for these runs, and False for other runs; the trial of a run for which **A** did not converge
+    has failed. ``corrections`` of these runs grows by 1. ``spent`` of every run becomes its
+    ``ticks`` so far.
     """
     for i in range(count):
         run = batch.runs[i]
