@@ -105,7 +105,7 @@ def checked(
     of_noise = [name for name in ("mean_ticks", "motor_noise") if has_value and name in there]
     numbers = [*numbers, *of_noise]
     wanted = [*dict.fromkeys((*names, *others, *status, *numbers))]
-    if missing := [name for name in wanted if name not in {*frame.columns}]:
+    if missing := [name for name in wanted if name not in there]:
         raise CoarticError(
             f"the frame has no column {', '.join(map(inline, missing))}; it needs "
             f"{', '.join(map(inline, wanted))}"

@@ -659,7 +659,8 @@ def draw_learning_curves(study: Study) -> Parts | None:
     if not len(data):
         return None
     tasks = [study.tasks[name] for name in data.task.unique()]
-    labels = [label for label in study.methods.index if label in {*data.method}]
+    drawn = {*data.method}
+    labels = [label for label in study.methods.index if label in drawn]
     rows, columns = style.grid(len(tasks))
     size = _width_of((rows, columns)), min(2.2 * rows + 0.5, style.TALLEST)
     if style.is_narrow():
