@@ -509,8 +509,6 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         - ``corrective_best``: reward of the corrective process alone with its best hands, which
           shares need (:func:`shares`);
         - ``budget``: the number of trials that was asked for, missing for a method without trials;
-        - ``noisy_ticks``: mean ticks of the run's solution with motor noise, missing if an
-          execution failed;
         - ``note``: what readers should know about the run; empty or missing if there is nothing;
         - ``mean_ticks`` and ``motor_noise``: a run with ``motor_noise`` above 0 has mean ticks
           instead of a reward;
@@ -535,10 +533,6 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
           (:func:`shares`), over the tasks on which something can be gained. It is NaN for a method
           that is not ranked. ``without_gain`` is the number of the tasks counted in column
           ``tasks`` on which no run has a share. Only for a frame with ``corrective_best``.
-        - ``noisy_gap``, ``noisy_gap_low``, ``noisy_gap_high``: mean gap of minus ``noisy_ticks``
-          to ``best_known``, computed like ``gap``. Note that ``best_known`` is a reward *without*
-          noise. The gap is NaN for a method that is not ranked, or if a run has no
-          ``noisy_ticks``. Only for a frame with ``noisy_ticks``.
         - ``tasks``: number of tasks with a best known reward on which the method has runs, all of
           them solved.
         - ``runs`` and ``failed``: number of runs, and number of failed runs, on all tasks.
@@ -576,11 +570,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     if "ranked_as" in existing:
         frame = frame.drop(columns=["method", "setting"], errors="ignore")
         frame = frame.rename(columns={"ranked_as": "method"})
-    runs = _scored_runs(frame, *(name for name in ("budget", "noisy_ticks") if name in existing))
+    runs = _scored_runs(frame, *(("budget",) if "budget" in existing else ()))
     if "note" in existing:
         runs["note"] = frame["note"].to_numpy(object)
-    if "noisy_ticks" in runs:
-        runs["noisy_gap"] = relative_gap(-runs.noisy_ticks, runs.best_known)
     asked = sorted(runs.budget.dropna().unique()) if "budget" in existing else []
     if len(asked) > 1:
         budgets = [f"{budget:.0f}" for budget in asked]
@@ -610,10 +602,6 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
             parts = [part for _, part in solved.dropna(subset="share").groupby("task").share]
             row |= (Estimate(np.nan) if why or not parts else task_mean(parts)).columns("share")
             row["without_gain"] = len(by_task) - len(parts)
-        if "noisy_gap" in runs:
-            parts = [part for _, part in solved.groupby("task").noisy_gap]
-            fails = bool(why) or solved.noisy_gap.isna().any()
-            row |= (Estimate(np.nan) if fails else task_mean(parts)).columns("noisy_gap")
         counts = {"tasks": len(by_task), "runs": len(of_method)}
         rows.append(row | counts | {"failed": int(of_method.value.isna().sum()), "why": why})
         if "note" in runs:

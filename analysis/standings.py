@@ -18,7 +18,6 @@ from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import listed, number
 from coartic.estimates import MIN_VALUES
 from coartic.internal.text import pluralize
-from coartic.runs.record import NOISE_RULE
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
@@ -45,7 +44,7 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 
 NOT_HERE = "no runs in this world"
 """Reason for not ranking a method that has runs only in other worlds of the folder."""
-ESTIMATES, COUNTS = ("gap", "share", "noisy_gap"), ("tasks", "runs", "failed")
+ESTIMATES, COUNTS = ("gap", "share"), ("tasks", "runs", "failed")
 """Columns of :func:`.ranking` that are estimates with an interval, and columns that are counts."""
 _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "parameters", "information"]
 """Columns of runs that no ranking uses. They are dropped to save memory in large folders."""
@@ -152,7 +151,6 @@ def standings(study: Study) -> pd.DataFrame:
 
         - how many trials the solved runs of a method from a file made, if the method uses the
           reward of each trial, and this number differs from the number that was asked for;
-        - how many of a method's solutions, found in the paper's world, can fail with motor noise;
         - how many executions failed in a world with noise.
 
         The frame also contains a row for each method, except searches for the optimum, that has
@@ -186,13 +184,9 @@ def standings(study: Study) -> pd.DataFrame:
         made = of_method.trials[of_method.value.notna()].dropna().astype(int)
         is_told = not row.built_in and row.information == BY_TRIAL and due and (made != due).any()
         ends = dict.fromkeys([made.min(), made.max()])
-        is_executed = (of_method.noise_rule == NOISE_RULE) & of_method.reward.notna()
-        fragile = int((is_executed & of_method.noisy_ticks.isna()).sum())
         failed = int(of_method.failed_executions.sum())
         note = [
             f"made {' to '.join(map(number, ends))} of {number(due)} trials" * bool(is_told),
-            f"{fragile} of {pluralize(len(of_method), 'solution')} can fail with motor noise"
-            * bool(fragile),
             f"{pluralize(failed, 'execution')} failed" * bool(failed),
         ]
         notes.append("; ".join(filter(None, note)))

@@ -58,7 +58,6 @@ UNITS = {
     **dict.fromkeys(["value", "corrective_best", "mean_ticks"], "ticks"),
     **dict.fromkeys(["build_s", "solve_s", "wall_s", "cpu_s", "time_limit_s"], "s"),
     "movement_ticks": "ticks",
-    "noisy_ticks": "ticks",
     "gap": "share of the best known reward",
     "other_arm_travel": "rad",
     "process_peak_mb": "MiB",

@@ -612,14 +612,7 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
         }
         entries |= {f"on {task}": gaps.get(task, math.nan) for task in single}
         if ranked:
-            names = (
-                "without_gain",
-                *(
-                    f"{name}{end}"
-                    for name in ("share", "noisy_gap")
-                    for end in ("", "_low", "_high")
-                ),
-            )
+            names = ("without_gain", "share", "share_low", "share_high")
             entries |= {name: row[name] for name in names} | {"gap_early": early[label]}
             entries |= {name: runs[name].mean() for name in ("forward_kinematics", "cpu_s")}
         else:
@@ -633,7 +626,6 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
     method             | method                            |   | tex
     gap[]              | gap (%)                           | 1 | tex
     share[]            | share of the gain (%)             | 0 | tex
-    noisy_gap[]        | gap executed with motor noise 0.01 (%) | 1 | tex
     information        | use of the reward
     better             | better than the learner on (tasks)
     worse              | worse on (tasks)
@@ -650,12 +642,11 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
 def list_ranking(study: Study) -> Rows:
     """Yield a row for each ranked method (:func:`.standings`), the smallest gap first.
 
-    A row contains means over tasks of the gap, of the share of the possible gain, of the gap with
-    motor noise 0.01, and of the gap after 1,000 trials (``gap_early``). It also contains the gap on
-    each individual task that has a best known reward, and mean costs over runs: the number of
-    forward-kinematics evaluations and the CPU time (in s). Columns ``better`` and ``worse`` are
-    numbers of individual tasks on which the method differs significantly from the learner. Gaps and
-    shares are fractions.
+    A row contains means over tasks of the gap, of the share of the possible gain, and of the gap
+    after 1,000 trials (``gap_early``). It also contains the gap on each individual task that has a
+    best known reward, and mean costs over runs: the number of forward-kinematics evaluations and
+    the CPU time (in s). Columns ``better`` and ``worse`` are numbers of individual tasks on which
+    the method differs significantly from the learner. Gaps and shares are fractions.
     """
     return _standing_rows(study, ranked=True)
 

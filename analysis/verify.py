@@ -260,7 +260,7 @@ def check_runs(folder: Path) -> Report:
         db.execute("PRAGMA query_only = ON")
         db.execute("PRAGMA trusted_schema = OFF")
         (version,) = db.execute("PRAGMA user_version").fetchone()
-        need(version in (7, 8), f"it has format {version}, not 7 or 8")
+        need(version in (7, 8, 9), f"it has format {version}, not 7, 8 or 9")
         (state,) = db.execute("PRAGMA integrity_check(1)").fetchone()
         need(state == "ok", f"it is damaged: {state}")
         runs, movements, wrong = 0, 0, list[str]()

@@ -315,11 +315,7 @@ def _postures(session: Session, task: Task) -> _Start | None:
         return None
     hands, ticks = best
     execution = corrective_trial(task, hands, model=session.model.without_noise())
-    session.spend(
-        forward_kinematics=execution.evaluations,
-        corrective_iterations=execution.iterations,
-        jacobians=execution.iterations,
-    )
+    session.spend(forward_kinematics=execution.evaluations)
     reached = np.where(explored_joints(session), execution.configurations, np.nan)
     return _Start(hands, reached, ticks)
 
@@ -393,12 +389,7 @@ def mean_ticks_in(session: Session, task: Task, start: _Start, worst: int, seed:
             compiled, codes, targets[:, :, None], worlds=noise_draws(world, draws)
         )
         trials = trials_of(records, task.robot.dof)
-        iterations = int(trials.iterations.sum())
-        session.spend(
-            forward_kinematics=int(trials.evaluations.sum()),
-            corrective_iterations=iterations,
-            jacobians=iterations,
-        )
+        session.spend(forward_kinematics=int(trials.evaluations.sum()))
         ticks = np.where(trials.completed, trials.ticks, worst)
         means: Array = ticks.reshape(len(points), executions).mean(axis=1)
         return means

@@ -378,7 +378,6 @@ class PosturePlanner:
             far = far[:left]
             if step == steps or not left:
                 break
-            self.session.spend(jacobians=left)
             across = jacobian[:left]
             transpose = across.transpose(0, 2, 1)
             gram = across @ transpose + _DAMPING * np.eye(2)

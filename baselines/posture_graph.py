@@ -94,7 +94,6 @@ def _sample_postures(
         position, jacobian = robot.linearised(q, hand)
         miss, jacobian = aim - position, jacobian * moving
         spent["forward_kinematics"] += count
-        spent["jacobians"] += count
         square = jacobian @ jacobian.swapaxes(-1, -2) + 1e-6 * np.eye(2)
         step = (jacobian.swapaxes(-1, -2) @ np.linalg.solve(square, miss[..., None]))[..., 0]
         length = np.linalg.norm(step, axis=1, keepdims=True)

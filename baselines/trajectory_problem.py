@@ -377,9 +377,7 @@ class TrajectoryProblem:
             rates=x[at["rates"]].reshape(self._order, goals + 1, self._dof),
             spent={
                 "forward_kinematics": self._evaluations * statistics.get("n_call_nlp_g", 0),
-                "jacobians": self._evaluations * statistics.get("n_call_nlp_jac_g", 0),
                 "gradients": statistics.get("n_call_nlp_grad_f", 0),
-                "hessians": statistics.get("n_call_nlp_hess_l", 0),
                 "solver_iterations": statistics["iter_count"],
             },
             base_weight=self._model.base_weight,

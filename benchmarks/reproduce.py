@@ -12,14 +12,14 @@ from shlex import quote
 
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Registry
-from coartic.benchmarks.scoring import score, with_noise
+from coartic.benchmarks.scoring import score
 from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import plain
 from coartic.method import Meter
 from coartic.pictures.trajectories import Trajectory, trajectory
 from coartic.runs.plan import Job
-from coartic.runs.record import OF_NOISE, PREFIXES, UNREPEATED, Row, too_long
+from coartic.runs.record import OF_NOISE, PREFIXES, UNREPEATED, Row, judged, too_long
 from coartic.runs.store import open_store
 
 
@@ -190,24 +190,22 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
 
 
 def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int, list[str]]:
-    """Execute solutions of a folder with motor noise again, and compare the mean ticks.
+    """Execute solutions of worlds with motor noise again, and compare the mean ticks.
 
-    The seed of the noise of a run is the same as when the run was scored (:func:`.with_noise`). If
-    the stored ticks of a run follow another version of the rule of noise, they are not compared.
+    Runs whose mean ticks follow another version of the rule of noise are left out.
 
     Parameters
     ----------
     folder : Path
         Results folder.
     every : bool
-        True to execute the solutions of all runs; False to execute the solution of one run of each
-        cell, chosen at random.
+        True to execute the solutions of all runs; False to execute that of one run of each cell,
+        chosen at random.
 
     Returns
     -------
     int
-        Number of solutions that were passed to :func:`.with_noise`. That function executes them
-        only in the paper's world and in worlds with motor noise.
+        Number of executed solutions.
     list of str
         A sentence for each number that differs from the stored one.
 
@@ -218,17 +216,16 @@ def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int,
     """
     executed, wrong = 0, list[str]()
     with open_store(folder) as store:
-        for run_ids in store.solved().values():
+        for run_ids in store.judged():
             for run_id in run_ids if every else [random.choice(run_ids)]:
                 stored = store.run(run_id)
-                (again,) = with_noise([stored])
+                (again,) = judged([stored])
                 executed += 1
-                if stored["noise_rule"] == again["noise_rule"]:  # else `coartic run` makes them
-                    wrong += [
-                        f"Run {run_id}: {name} is {again[name]}, not {stored[name]}."
-                        for name in OF_NOISE
-                        if stored[name] != again[name]
-                    ]
+                wrong += [
+                    f"Run {run_id}: {name} is {again[name]}, not {stored[name]}."
+                    for name in OF_NOISE
+                    if stored[name] != again[name]
+                ]
     return executed, wrong
 
 
@@ -259,7 +256,7 @@ def compare_runs(a: Row, b: Row) -> list[str]:
         a, b = a.downsample(), b.downsample()
     details = ({k: v for k, v in run.details.items() if k != UNREPEATED} for run in (a, b))
     pairs = [("details", *details)]
-    names = ["status", "reason", *Meter.COUNTS]
+    names = ["status", "reason", "best_trial", "practice", *Meter.COUNTS]
     if a["run_id"] == b["run_id"] and a["noise_rule"] == b["noise_rule"]:
         names += OF_NOISE  # the id is the seed of the noise
     pairs += [(name, a[name], b[name]) for name in names]

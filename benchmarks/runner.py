@@ -22,7 +22,7 @@ from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
-from coartic.benchmarks.scoring import score, with_noise
+from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.time_left import TimeLeft
 from coartic.errors import CoarticError
@@ -31,7 +31,7 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import error_line, pluralize
 from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
-from coartic.runs.record import UNREPEATED, Row
+from coartic.runs.record import UNREPEATED, Row, judged
 from coartic.runs.store import Store, open_store_for_writing
 
 _MIN_BATCH = 8
@@ -255,7 +255,7 @@ def perform(
         own_methods = {job.cell.method.name: job for job in missing if not job.cell.method.is_ours}
         repeats = [replace(job, numbers=job.numbers[:1]) for job in own_methods.values()]
         for ids in store.outdated_noise():
-            store.write(with_noise([store.run(run_id) for run_id in ids]))
+            store.write(judged([store.run(run_id) for run_id in ids]))
         progress.time_left = TimeLeft(executor.workers)
         progress.time_left.expect([*missing, *repeats])
         tell(None)

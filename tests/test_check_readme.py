@@ -33,7 +33,7 @@ def test_equal_numbers_are_equal():
     [
         ("CMA-ES", "gap_high", 0.0146),
         ("learner (EC1, EC4)", "gap_low", NAN),
-        ("CMA-ES", "noisy_gap_high", NAN),
+        ("CMA-ES", "gap_in_noise_high", NAN),
         ("corrective process", "share", 0.4414),
     ],
 )

@@ -6,7 +6,7 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 
 from coartic import corrective_trial, load_task
-from coartic.benchmarks import conformance, reproduce, scoring
+from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.processes import CONTEXT
 from coartic.benchmarks.registry import registry
@@ -74,7 +74,6 @@ def quick_checks(monkeypatch, another_process):
 
     monkeypatch.setattr(conformance, "CHECK_TRIALS", TRIALS)
     monkeypatch.setattr(reproduce, "Local", HereAndThere)
-    monkeypatch.setattr(scoring, "with_noise", list)
 
 
 @pytest.mark.parametrize("name", [*BUILT_IN, "test/good"])

@@ -98,12 +98,10 @@ def test_until_the_first_that_is_better():
 def test_a_session_counts_per_configuration():
     session = Session(load_task("ascending"), 0, set(Information), trial_budget=2)
     session.forward_kinematics(np.zeros((4, 5, 10)), "right")
-    session.jacobian(np.zeros((3, 10)), "right")
     correction = session.correct(session.q0, "right", 1)
     execution = session.trial([Movement(k, "right", "corrective") for k in (1, 2, 3)])
     meter = session.meter
     assert meter.forward_kinematics == 20 + correction.iterations + 1 + execution.evaluations
-    assert meter.jacobians == 3 + correction.iterations + execution.iterations
     assert (meter.trials, meter.movement_ticks, meter.corrections) == (1, 319, 3)
     assert session.trials_left == 1
     with pytest.raises(ValueError, match="goal is .* from 1 to 3"):

@@ -173,14 +173,6 @@ def test_what_compares_runs_needs_one_world():
     assert len(study.methods) == 3
 
 
-def test_older_rules_of_noise_are_no_failures():
-    """Noisy ticks are missing where they are to be made again, and where an execution fails."""
-    known = {TASK: BestKnown(-292, -292)}
-    for rule, note in ((2, "2 of 2 solutions can fail with motor noise"), (1, ""), (None, "")):
-        rows = runs_of(TASK, "a", [-300, -302], noisy_ticks=None, noise_rule=rule)
-        assert standings(study_of(rows, optima=known)).note["a"] == note
-
-
 def test_tests_and_differences_are_of_values():
     """A learner and an own method with as many runs in noise as tests need: 3 ticks apart."""
     ticks = np.arange(10.0)
@@ -343,8 +335,6 @@ def test_commands_name_the_worlds(study, coartic, capsys):
     paper, noise, of_norm = capsys.readouterr().out.split("The world ")
     assert paper.startswith("The paper's world:\n")
     assert noise.startswith(f"{NOISE}:\n")
-    assert "noisy gap" in paper
-    assert "noisy gap" not in noise + of_norm
     assert "best known reward or best of this folder in this world" in " ".join(noise.split())
     assert "Not ranked  1 of 2 tasks: CMA-ES" in noise
     assert "no runs in this world: random search" in of_norm

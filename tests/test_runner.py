@@ -14,13 +14,12 @@ from coartic import (
     CoarticError,
     Movement,
     corrective_trial,
-    execute_noisy,
     initial_hands,
     load_task,
 )
 from coartic.analysis import TABLES
 from coartic.analysis.study import load
-from coartic.benchmarks import provenance, reproduce, scoring
+from coartic.benchmarks import provenance, reproduce
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
@@ -29,8 +28,7 @@ from coartic.benchmarks.worker import fail
 from coartic.method import Meter
 from coartic.motion.kernels.slots import SLOTS
 from coartic.runs.plan import Job, run_seed
-from coartic.runs.record import MOTOR_NOISE, Outcome, Times
-from coartic.runs.store import open_store
+from coartic.runs.record import Outcome, Times
 from tests.support.strategies import STUCK, tiny_task
 from tests.support.suites import (
     BROKEN,
@@ -68,7 +66,6 @@ class Spoils(InProcess):
 
 
 def test_what_goes_wrong_side_by_side_is_performed_again_alone(tmp_path, monkeypatch):
-    monkeypatch.setattr(scoring, "with_noise", list)  # takes most of the time
     honest, spoilt = (
         run_and_write(
             tmp_path / each.__name__, [LEARNER, ALONE], executor=each(), runs=SLOTS + 2, trials=3
@@ -234,22 +231,6 @@ def test_the_runs_of_a_batch_are_scored():
     assert reasons == ["", "", "it reported ok, but returned no solution", "too slow"]
     better = replace(runs[0], rewards=[None, -310, -319, -319])  # than the solution
     assert better.downsample().rewards == [None, -310, -319, None]
-
-
-def test_ticks_with_noise_are_of_a_runs_own_seed_and_missing_if_an_execution_fails(
-    results, monkeypatch
-):
-    """Whatever the runs beside it."""
-    solutions = results.executed("two-armed-1", "dual-process/EC4")
-    noisy = results.runs.set_index("run_id").noisy_ticks
-    for run_id, execution in zip(solutions.run_ids, solutions.runs, strict=True):
-        seed = int(run_id.partition("-")[0], 16)
-        ticks = execute_noisy("two-armed-1", [execution.movements], MOTOR_NOISE, 100, [seed])
-        assert noisy[run_id] == ticks.mean()
-    with open_store(results.folder) as store:
-        runs = [store.run(run_id) for run_id in solutions.run_ids]
-    monkeypatch.setattr(scoring, "execute_noisy", lambda *_: np.array([[1, np.nan], [2, 4]]))
-    assert [run["noisy_ticks"] for run in scoring.with_noise(runs)] == [None, 3.0]
 
 
 def test_a_solution_that_misses_a_goal_is_infeasible():

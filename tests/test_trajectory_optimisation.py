@@ -133,12 +133,12 @@ def test_a_full_stop_at_each_goal_costs_as_independent_reaches_do(cost):
 
 
 def test_the_cheapest_plan_that_converged_is_kept():
-    plans = [SimpleNamespace(cost=c, converged=c > 1, spent={"hessians": 1}) for c in (3, 2, 1, 4)]
+    plans = [SimpleNamespace(cost=c, converged=c > 1, spent={"gradients": 1}) for c in (3, 2, 1, 4)]
     session = Session(small_task(), 0, ())
     for given, kept in ((plans, plans[1]), ([plans[2], plans[2]], plans[2])):
         problem = SimpleNamespace(solve=lambda _, plan, **options: plan)
         assert cheapest_plan(session, problem, None, given) is kept
-    assert session.meter.hessians == 6
+    assert session.meter.gradients == 6
 
 
 def test_a_solve_that_fails_says_so():

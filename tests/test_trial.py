@@ -71,7 +71,7 @@ def by_execute_many(task, model, cases):
 def by_trials(task, model, cases):
     session = Session(task, 0, OPTIMISER_INFORMATION, model=model)
     trials = session.trials([case.hands for case in cases], np.array([c.targets for c in cases]))
-    assert session.meter.jacobians == trials.iterations.sum()
+    assert session.meter.forward_kinematics == trials.evaluations.sum()
     assert session.meter.movement_ticks == trials.ticks.sum()
     assert session.meter.corrections == trials.corrections.sum()
     assert session.meter.failed_trials == session.rewards.count(None)

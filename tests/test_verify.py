@@ -141,23 +141,6 @@ def test_an_edit_is_found(true_folder, tmp_path, words):
     assert any(words.strip() in sentence for sentence in said), said
 
 
-@pytest.mark.parametrize("value", ["noisy_ticks - 1", "NULL"])
-def test_ticks_with_motor_noise_are_made_again(true_folder, tmp_path, coartic, value):
-    """Of one run of each cell, and of all on request; the cell with one run is found by both."""
-    code, out, _ = coartic("verify", true_folder)
-    assert (code, out.splitlines()[1:]) == (
-        0,
-        ["3 solutions executed with motor noise.", "Nothing differs."],
-    )
-    of_path = edited(true_folder, tmp_path, *result(PATH, f"noisy_ticks = {value}"))
-    code, out, _ = coartic("verify", of_path)
-    assert (code, out.count("noisy_ticks is ")) == (1, 1)
-    edit(of_path, *result(LEARNER, f"noisy_ticks = {value}"))
-    code, out, _ = coartic("verify", of_path, "--noise")
-    assert (code, out.count("noisy_ticks is ")) == (1, 2)
-    assert "4 solutions executed with motor noise." in out
-
-
 def test_the_program_says_what_it_found(true_folder, tmp_path, capsys, monkeypatch):
     wrong = edited(true_folder, tmp_path, *result(TINY, "reward = -1"))
     for code, (folder, words) in enumerate([(true_folder, "Nothing differs."), (wrong, "not -1")]):

@@ -181,8 +181,8 @@ def test_what_a_method_recommends_is_judged_without_the_ticks_that_it_tells():
     assert (row["mean_ticks"], row["failed_executions"]) == judged(task, model, asked)
     assert row["noise_rule"] == NOISE_RULE
     assert row["hands"] == "RLRR"
-    names = "reward", "best_trial", "initial_reward", "replay_reward", "noisy_ticks"
-    assert [row[name] for name in names] == [None] * 5
+    names = "reward", "best_trial", "initial_reward", "replay_reward"
+    assert [row[name] for name in names] == [None] * 4
     assert json.loads(row["practice"]) == [400.0, None, *map(float, range(380, 372, -1))]
 
 
@@ -246,13 +246,30 @@ def test_a_noisy_run_is_the_same_after_a_crash_and_when_it_is_made_again(tmp_pat
         assert row["mean_ticks"] == repeated["mean_ticks"]
 
 
-def test_verify_executes_noisy_runs_again(tmp_path):
-    perform(noisy_plan(), tmp_path / "a", executor=InProcess())
+def test_verify_executes_noisy_runs_again(tmp_path, coartic):
+    """Of one run of each cell, and of all on request."""
+    perform([*noisy_plan(), *noisy_plan(model=PAPER)], tmp_path / "a", executor=InProcess())
+    code, out, _ = coartic("verify", tmp_path / "a")
+    assert (code, "4 solutions executed with motor noise." in out) == (0, True)
     assert reproduce.execute_with_noise_again(tmp_path / "a", every=True) == (7, [])
     edit(tmp_path / "a", "UPDATE results SET mean_ticks = mean_ticks - 1 WHERE run = 1")
     _, wrong = reproduce.execute_with_noise_again(tmp_path / "a", every=True)
     assert len(wrong) == 3
     assert all("mean_ticks is" in sentence for sentence in wrong)
+    code, out, _ = coartic("verify", tmp_path / "a", "--noise")
+    assert (code, out.count("mean_ticks is")) == (1, 3)
+    perform(noisy_plan(), tmp_path / "a", executor=InProcess())  # nothing is missing
+
+
+def test_mean_ticks_by_an_older_rule_are_missing_until_they_are_made_again(tmp_path):
+    perform(noisy_plan(), tmp_path / "a", executor=InProcess())
+    runs = results_in(tmp_path / "a")[1]
+    edit(tmp_path / "a", "UPDATE results SET mean_ticks = 1, noise_rule = 1 WHERE run = 1")
+    assert results_in(tmp_path / "a")[1].mean_ticks.isna().sum() == 3
+    perform(noisy_plan(), tmp_path / "a", executor=InProcess())
+    made = results_in(tmp_path / "a")[1]
+    assert made.mean_ticks.tolist() == runs.mean_ticks.tolist()
+    assert made.date.tolist() == runs.date.tolist()  # no method ran
 
 
 def as_version_6(folder):
@@ -286,29 +303,19 @@ def old(tmp_path):
     return folder, runs
 
 
-def test_an_older_folder_is_read_with_its_noisy_ticks_missing(old):
+def test_an_older_folder_is_read_and_gone_on_with(old, tmp_path):
     folder, runs = old
-    read = results_in(folder)[1]
-    same = [name for name in runs if name not in ("noisy_ticks", "noise_rule")]
-    assert read[same].equals(runs[same])
-    assert read.noisy_ticks.isna().all()
-    assert runs.noisy_ticks.notna().all()
+    assert results_in(folder)[1].equals(runs)
     assert check_runs(folder).wrong == []
     with open_store(folder) as store:
         assert store.run(store.ids()[0])["noise_rule"] is None
-    assert reproduce.execute_with_noise_again(folder, every=True)[1] == []
-
-
-def test_run_and_include_make_older_ticks_again(old, tmp_path):
-    folder, runs = old
+    assert reproduce.execute_with_noise_again(folder, every=True) == (0, [])
     plan = noisy_plan(model=PAPER)
     joined = include_folders(plan, [folder], tmp_path / "new")
     perform(joined, tmp_path / "new", executor=InProcess())
-    perform(plan, folder, executor=InProcess())
+    assert perform(plan, folder, executor=InProcess()).done == 0
     for each in (tmp_path / "new", folder):
-        made = results_in(each)[1]
-        assert made.noisy_ticks.tolist() == runs.noisy_ticks.tolist()
-        assert made.date.tolist() == runs.date.tolist()  # no method ran
+        assert results_in(each)[1].equals(runs)
 
 
 def test_worlds_of_a_folder_do_not_mix(tmp_path):

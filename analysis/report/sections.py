@@ -179,8 +179,6 @@ Among ranked methods {{ use }}, the smallest gap to the {{ reference }} is {{ ga
 
 {% endfor %}""",
         note="The gap is the ticks of the mean reward beyond the {reference}, in per cent of it. "
-        "A gap executed with motor noise is of solutions that were practised without noise and "
-        "executed with it; that gap is to the {reference} without noise. "
         "The share of the gain is 0 % for the corrective process alone with its best hands (with "
         "the task's initial hands if there are more than 4096 hand sequences), and 100 % for the "
         "{reference}; tasks on which both are equal have none. Intervals "

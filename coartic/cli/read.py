@@ -127,7 +127,6 @@ def _say_ranking_of_world(study: Study) -> None:
     from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
     from coartic.estimates import MIN_VALUES
-    from coartic.runs.record import MOTOR_NOISE
 
     methods, notes = standings(study), limits(study)
     has_others = bool(methods.built_in.any())
@@ -140,13 +139,10 @@ def _say_ranking_of_world(study: Study) -> None:
     ]
     methods = methods.assign(name=names)
     ranked, unranked = methods[methods.why == ""], methods[methods.why != ""]
-    has_noise = not ranked.noisy_gap.isna().all()  # solutions of the paper's world, in noise
-    headings = ["method", "gap (%)", "share (%)", *["noisy gap (%)"] * has_noise, "runs"]
-    headings += ["note"] * any(ranked.note)
+    headings = ["method", "gap (%)", "share (%)", "runs", *["note"] * any(ranked.note)]
     cells = [
         [row["name"], interval(row, "gap", scale=100), interval(row, "share", 0, 100),
-         *[interval(row, "noisy_gap", scale=100)] * has_noise, number(row["runs"]),
-         row["note"]][: len(headings)]
+         number(row["runs"]), row["note"]][: len(headings)]
         for row in ranked.to_dict("records")
     ]  # fmt: skip
     say_table(headings, cells)
@@ -161,8 +157,7 @@ def _say_ranking_of_world(study: Study) -> None:
     if len(ranked):
         known = f"gaps are to the {reference(study, ranked_tasks(study))}"
         known += " in this world" * bool(study.world)
-        noise = f"; noisy gaps, too, of solutions executed with motor noise {MOTOR_NOISE}"
-        pairs.append(("Reference", known + noise * has_noise))
+        pairs.append(("Reference", known))
     if notes["own"]:
         known = f"for {listed(notes['own'])} only the best reward of this folder is known"
         if searches := notes["searches"]:

@@ -294,11 +294,12 @@ def _learn_together(
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
             corrections=results.corrections[n],
-            counters=Meter(trials=trials, jacobians=counts["corrective_iterations"], **counts),
+            counters=Meter(trials=trials, **counts),
             wall_s=wall / runs,
         )
         for n, seed in enumerate(seeds)
-        for counts in [dict(zip(COUNTED, results.counts[n].tolist(), strict=True))]
+        for every in [dict(zip(COUNTED, results.counts[n].tolist(), strict=True))]
+        for counts in [{name: every[name] for name in every if name in Meter.COUNTS}]
     ]
 
 

@@ -123,25 +123,19 @@ class Meter:
     """Physical trials, including failed trials."""
     initial_trials: int = 0
     """Trials of the search for the initial hands, if the task names a policy. These trials are not
-    counted in ``trials`` and ``failed_trials``, but their ticks, corrections, iterations and
-    evaluations are included in the counts below."""
+    counted in ``trials`` and ``failed_trials``, but their ticks, corrections and evaluations are
+    included in the counts below."""
     movement_ticks: int = 0
     """Control ticks of all trials, including ``initial_trials``."""
     forward_kinematics: int = 0
     """Forward-kinematics evaluations, one for each configuration and hand. Compiled kernels skip
     steps that cannot end a movement; these steps are not counted."""
-    jacobians: int = 0
-    """Jacobian evaluations. The corrective process makes one per iteration."""
-    corrective_iterations: int = 0
-    """Iterations of the corrective process."""
     corrections: int = 0
     """Corrective movements made."""
     failed_trials: int = 0
     """Number of ``trials`` that did not hit every goal."""
     gradients: int = 0
     """Gradient evaluations of a solver."""
-    hessians: int = 0
-    """Hessian evaluations of a solver."""
     solver_iterations: int = 0
     """Iterations of a solver."""
     build_s: float = 0.0
@@ -151,14 +145,7 @@ class Meter:
 
     COUNTS: ClassVar[tuple[str, ...]]
     """Names of all counters except the times."""
-    SOLVER: ClassVar[tuple[str, ...]] = (
-        "forward_kinematics",
-        "jacobians",
-        "corrective_iterations",
-        "gradients",
-        "hessians",
-        "solver_iterations",
-    )
+    SOLVER: ClassVar[tuple[str, ...]] = ("forward_kinematics", "gradients", "solver_iterations")
     """Counters to which a method may add (:meth:`Session.spend`): the evaluations and iterations of
     its own solver or of its own corrective process."""
 
@@ -427,15 +414,12 @@ class Session:
             ``q`` or ``hand`` does not fit the robot.
         """
         self._use(Information.JACOBIAN)
-        jacobians = self._task.robot.jacobian(q, hand)
-        self._meter.add(jacobians=jacobians[..., 0, 0].size)
-        return jacobians
+        return self._task.robot.jacobian(q, hand)
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
         """Run the corrective process for a goal, and count its evaluations.
 
-        The robot does not move. Iterations, Jacobians and forward-kinematics evaluations are
-        counted.
+        The robot does not move. Forward-kinematics evaluations are counted.
 
         Parameters
         ----------
@@ -468,19 +452,15 @@ class Session:
             locked_base=self._task.locked_base,
             model=self.model.without_noise().for_radius(self._task.radius),
         )
-        self._meter.add(
-            corrective_iterations=correction.iterations,
-            jacobians=correction.iterations,
-            forward_kinematics=correction.iterations + 1,
-        )
+        self._meter.add(forward_kinematics=correction.iterations + 1)
         return correction
 
     def trial(self, solution: Sequence[Movement]) -> Execution:
         """Make one physical trial of a solution, and count it.
 
-        The ticks, evaluations, iterations and corrections of the trial are counted as well. If a
-        goal is missed, the corrective process acts, and the ticks of its movement are part of the
-        reward. With motor noise, trial k of the session (from 0) is made with draw k of the noise.
+        The ticks, evaluations and corrections of the trial are counted as well. If a goal is
+        missed, the corrective process acts, and the ticks of its movement are part of the reward.
+        With motor noise, trial k of the session (from 0) is made with draw k of the noise.
 
         Parameters
         ----------
@@ -514,7 +494,6 @@ class Session:
                 _pack_rewards([execution.reward]),
                 execution.ticks,
                 execution.evaluations,
-                execution.iterations,
                 execution.corrections,
                 not execution.completed,
             )
@@ -676,7 +655,8 @@ class Session:
             if better.any():
                 count = int(better.argmax()) + 1
                 records = TrialRecords._make(array[:count] for array in records)
-        self._count(records.rewards, *np.add.reduce(records.counts).tolist())
+        ticks, evaluations, _, corrections, failed = np.add.reduce(records.counts).tolist()
+        self._count(records.rewards, ticks, evaluations, corrections, failed)
         return records
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
@@ -718,22 +698,19 @@ class Session:
         rewards: array[int] | NDArray[np.int64],
         ticks: int,
         evaluations: int,
-        iterations: int,
         corrections: int,
         failed: int,
     ) -> None:
         """Add trials to :attr:`rewards` and to the meter.
 
         ``rewards`` contains :data:`NO_REWARD` for each failed trial; all other arguments are sums
-        over the trials. Each iteration is also counted as an evaluation of a Jacobian.
+        over the trials.
         """
         made, meter = len(self._rewards), self._meter
         self._rewards.frombytes(rewards.tobytes())
         meter.trials += len(self._rewards) - made
         meter.movement_ticks += ticks
         meter.forward_kinematics += evaluations
-        meter.corrective_iterations += iterations
-        meter.jacobians += iterations
         meter.corrections += corrections
         meter.failed_trials += failed
 

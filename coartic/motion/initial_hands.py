@@ -12,7 +12,7 @@ import numpy as np
 from coartic.errors import NotApplicableError
 from coartic.internal.limits import brief_value
 from coartic.model import PAPER, MotionModel
-from coartic.motion.kernels.trial import COUNTED, FAILURES
+from coartic.motion.kernels.trial import COUNTED
 from coartic.motion.trials import (
     compiled_task,
     count_trials,
@@ -232,6 +232,6 @@ def _search_by_policy(
             f"task {task.name!r}: the corrective process does not complete it with any hand "
             f"sequence that initial_hands = {task.initial_hands!r} allows; with {best}, {reason}"
         )
-    spent = {name: sum(counts[name] for *_, counts in ranked) for name in COUNTED[:FAILURES]}
-    spent["jacobians"] = spent["corrective_iterations"]
+    names = [name for name in COUNTED if name not in ("iterations", "failed_trials")]
+    spent = {name: sum(counts[name] for *_, counts in ranked) for name in names}
     return best, {"initial_trials": len(ranked), **spent}

@@ -34,17 +34,13 @@ PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
 """Dict that maps each part of a run to the prefix of its columns. The parts are ``solution``,
 ``initial`` (the first trial of a learner) and ``replay`` (a greedy trial after learning)."""
 PARTS = tuple(PREFIXES)
-MOTOR_NOISE = 0.01
-"""Standard deviation of the motor noise with which solutions that were found in the paper's world
-are scored a second time, in length units and rad (:func:`coartic.execute_noisy`). Solutions of a
-world with motor noise are scored with the noise of that world."""
 NOISY_EXECUTIONS = 100
-"""Number of executions of each solution with motor noise."""
+"""Number of executions from which a solution of a world with motor noise is scored."""
 NOISE_RULE = 2
 """Version of the rule of motor noise. Mean ticks that were computed by another version are shown as
 missing until they are computed again, so that a column never mixes two versions. Increase the
 version with each change of :mod:`coartic.motion.kernels.noise` or of :func:`.judge_seed`."""
-OF_NOISE = ("noisy_ticks", "mean_ticks", "failed_executions")
+OF_NOISE = ("mean_ticks", "failed_executions")
 """Names of the columns that depend on the rule of motor noise."""
 UNREPEATED = "made_again"
 """Key in the details of a run that was performed again with another result. The value describes
@@ -174,8 +170,7 @@ _NOTHING = SimpleNamespace(reward=None, hands=None, corrections=None, other_arm_
 def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date: str = "") -> Row:
     """Return the row of a run from its outcome and the executions of its parts.
 
-    The columns in :data:`OF_NOISE` and ``noise_rule`` are None;
-    :func:`coartic.benchmarks.scoring.with_noise` sets them.
+    The columns in :data:`OF_NOISE` and ``noise_rule`` are None; :func:`judged` sets them.
 
     Parameters
     ----------
@@ -287,12 +282,9 @@ COLUMNS = (
      "how many of these executions failed"),
     ("practice", "TEXT", "practice",
      "in a world with noise: mean ticks of the trials in each tenth, as JSON"),
-    ("noisy_ticks", "REAL", "later",
-     "of a solution found in the paper's world: mean ticks of 100 executions with motor noise "
-     "0.01; missing if one of them fails"),
     ("noise_rule", "INTEGER", "later",
-     "version of the rule of noise; ticks of another version are shown as missing until "
-     "`coartic run` makes them again"),
+     "in a world with noise: version of the rule of noise; mean ticks of another version are shown "
+     "as missing until `coartic run` makes them again"),
     ("replay_reward", "INTEGER", "replay.reward",
      "of one more trial of a learner, greedy and without noise"),
     ("replay_hands", "TEXT", "replay.hands", "hand of each goal in that trial"),
@@ -307,14 +299,10 @@ COLUMNS = (
     ("movement_ticks", "INTEGER", "counts.movement_ticks", "control ticks of all these trials"),
     ("forward_kinematics", "INTEGER", "counts.forward_kinematics",
      "evaluations of the forward kinematics"),
-    ("jacobians", "INTEGER", "counts.jacobians", "evaluations of the Jacobian"),
-    ("corrective_iterations", "INTEGER", "counts.corrective_iterations",
-     "iterations of the corrective process"),
     ("corrections", "INTEGER", "counts.corrections",
      "corrective movements of all these trials"),
     ("failed_trials", "INTEGER", "counts.failed_trials", "trials that missed a goal"),
     ("gradients", "INTEGER", "counts.gradients", "evaluations of a solver's gradient"),
-    ("hessians", "INTEGER", "counts.hessians", "evaluations of a solver's Hessian"),
     ("solver_iterations", "INTEGER", "counts.solver_iterations", "iterations of a solver"),
     ("solution_corrections", "INTEGER", "solution.corrections",
      "corrective movements of the solution"),
@@ -472,6 +460,20 @@ def judge(
     best = best_hands(task, exact)
     capped = np.where(np.isnan(ticks), np.nan if best is None else 2.0 * best[1], ticks)
     return capped.mean(axis=1), np.isnan(ticks).sum(axis=1)
+
+
+def judged(runs: Sequence[Row]) -> list[Row]:
+    """Return copies of solved runs of one cell in a world with noise, with :data:`OF_NOISE` set."""
+    cell, seeds = runs[0].cell, [run.job.judge_seed(run["run"]) for run in runs]
+    means, failed = judge(cell.task, [run.part("solution") for run in runs], cell.model, seeds)
+    return [
+        run.with_values(
+            mean_ticks=None if math.isnan(mean) else mean,
+            failed_executions=count,
+            noise_rule=NOISE_RULE,
+        )
+        for run, mean, count in zip(runs, means.tolist(), failed.tolist(), strict=True)
+    ]
 
 
 def too_long(

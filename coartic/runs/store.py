@@ -40,6 +40,7 @@ from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
     NOISE_RULE,
+    OF_NOISE,
     UNREPEATED,
     Row,
     movement_from,
@@ -50,12 +51,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RUNS_FILE = "runs.sqlite"
-FORMAT = 8
+FORMAT = 9
 """Number of the format. A change of a table or a view must increase it."""
 OLDEST = 7
-"""Oldest format that can be read, the format of version 6.0.0. Columns that this format lacks are
-shown as missing values, except ``world``, which is shown as the empty string. ``coartic run`` adds
-these columns to the folder into which it writes."""
+"""Oldest format that can be read, the format of version 6.0.0. Version 7.0.0 wrote format 8.
+Columns that a format lacks are shown as missing values, except ``world``, which is shown as the
+empty string. ``coartic run`` adds these columns to the folder into which it writes."""
 _APPLICATION = 0x636F6172  # "coar"
 
 _KINDS = {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64", "BOOLEAN": "boolean"}
@@ -68,8 +69,9 @@ _DTYPES: dict[str, Any] = {
 values."""
 _CELL = TypeAdapter(Cell)
 _STORED = ", ".join(f"{name} {kind}" for name, kind, source, _ in COLUMNS if source)
-_NOISY = {name: f"CASE WHEN noise_rule = {NOISE_RULE} THEN {name} END AS {name}"
-          for name in ("noisy_ticks", "mean_ticks", "failed_executions")}  # fmt: skip
+_NOISY = {
+    name: f"CASE WHEN noise_rule = {NOISE_RULE} THEN {name} END AS {name}" for name in OF_NOISE
+}
 _IN_VIEW = ", ".join(_NOISY.get(name, f'"{name}"') for name, *_ in COLUMNS)
 _SOLUTIONS = """SELECT run_id, key AS "order", json_extract(value, '$[0]') AS goal,
     json_extract(value, '$[1]') AS hand, json_extract(value, '$[2]') AS kind,
@@ -316,16 +318,12 @@ class Store:
         query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
         return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
-    def solved(self) -> dict[str, list[str]]:
-        """Return a dict that maps ids of cells to lists of the ids of solved runs.
+    def judged(self) -> list[list[str]]:
+        """Return the ids of the runs with mean ticks by the present rule of noise, by cell.
 
-        A solved run has status ``ok``. Cells and runs outside the plan are included; cells without
-        solved runs are left out.
+        Cells and runs outside the plan are included.
         """
-        by_cell = defaultdict[str, list[str]](list)
-        for cell, run_id in self._rows("SELECT cell, run_id FROM results WHERE status = 'ok'"):
-            by_cell[cell].append(run_id)
-        return dict(by_cell)
+        return self._in_noise("results JOIN cells ON cells.id = cell", f"= {NOISE_RULE}")
 
     def results(self) -> dict[str, str]:
         """Return a dict that maps the id of each stored run to its column ``result``."""
@@ -386,7 +384,10 @@ class Store:
                     ("environments", "TRUE"),
                     ("results", "cell IN (SELECT id FROM main.cells WHERE runs IS NOT NULL)"),
                 ):
-                    names = ", ".join(f'"{name}"' for name in self._columns(table, "other"))
+                    here = self._columns(table)
+                    names = ", ".join(
+                        f'"{name}"' for name in self._columns(table, "other") if name in here
+                    )
                     self._db.execute(
                         f"""INSERT OR IGNORE INTO main.{table} ({names})
                         SELECT {names} FROM other.{table} WHERE {condition}"""
@@ -443,12 +444,10 @@ class Store:
             of :data:`.COLUMNS`, with nullable types.
         """
         there = {*self._columns("asked")}
-        missing = {"world": "'' AS world", "noisy_ticks": "NULL AS noisy_ticks"}
-        names = [name for name, *_ in COLUMNS]
-        if there >= {*names}:
-            return self._frame("SELECT * FROM runs")
+        missing = {"world": "'' AS world"}
         columns = [
-            missing.get(name, f'"{name}"' if name in there else f"NULL AS {name}") for name in names
+            _NOISY.get(name, f'"{name}"') if name in there else missing.get(name, f"NULL AS {name}")
+            for name, *_ in COLUMNS
         ]
         return self._frame(f"SELECT {', '.join(columns)} FROM asked ORDER BY position, run")
 
@@ -513,16 +512,16 @@ class Store:
                 yield run_id, _unpack(blob)
 
     def outdated_noise(self) -> list[list[str]]:
-        """Return the ids of runs without mean ticks by the present rule of motor noise.
+        """Return the ids of planned runs whose mean ticks follow another rule of noise, by cell."""
+        return self._in_noise("asked JOIN cells ON cells.id = cell", f"IS NOT {NOISE_RULE}")
 
-        The mean ticks are missing, or were computed by another version of the rule
-        (:data:`.NOISE_RULE`). In a world without motor noise that is not the paper's, all runs are
-        without such ticks. Only runs of the plan with status ``ok`` are considered. The result
-        contains a list of ids for each cell with such runs.
-        """
-        rule = "noise_rule" if "noise_rule" in self._columns("asked") else "NULL"
-        query = f"""SELECT position, run_id FROM asked WHERE status = 'ok'
-            AND {rule} IS NOT {NOISE_RULE} ORDER BY position, run"""
+    def _in_noise(self, table: str, rule: str) -> list[list[str]]:
+        """Return the ids of solved runs in worlds with motor noise, by cell."""
+        if "noise_rule" not in self._columns("results"):  # format 7, which has no noise
+            return []
+        query = f"""SELECT cells.id, run_id FROM {table} WHERE status = 'ok'
+            AND json_extract(cells.content, '$.model.motor_noise') > 0 AND noise_rule {rule}
+            ORDER BY cells.id, run"""
         groups = groupby(self._rows(query), itemgetter(0))
         return [[run_id for _, run_id in rows] for _, rows in groups]
 
@@ -789,9 +788,10 @@ def _add_columns(connection: sqlite3.Connection) -> None:
         for name, kind, source, _ in COLUMNS
         if source and name not in stored
     ]
+    if "world" not in {row[1] for row in connection.execute("PRAGMA table_info(cells)")}:
+        added.append("ALTER TABLE cells ADD COLUMN world TEXT NOT NULL DEFAULT '';")
     connection.executescript(
         f"""BEGIN; {" ".join(added)}
-        ALTER TABLE cells ADD COLUMN world TEXT NOT NULL DEFAULT '';
         DROP VIEW runs; DROP VIEW solutions; DROP VIEW asked; {_VIEWS}
         PRAGMA user_version = {FORMAT}; COMMIT;"""
     )

@@ -16,7 +16,7 @@ import pandas as pd
 from coartic.analysis import TABLES, Study, interval, load
 
 README = Path(__file__).parents[2] / "README.md"
-COLUMNS = ("gap", "noisy_gap", "share")
+COLUMNS = ("gap", "gap_in_noise", "share")
 """Columns of :func:`ranking_of` that the table of README shows, in its order."""
 NOISE = "motor_noise=0.01"
 """World of the second column of the table: methods practise and are judged in this world."""
@@ -61,13 +61,13 @@ def differences(text: str, ranking: pd.DataFrame) -> tuple[int, list[str]]:
 def ranking_of(study: Study) -> pd.DataFrame:
     """Return the ranking in the paper's world, with gaps in the noisy world.
 
-    The frame is indexed by the titles of methods. The columns ``noisy_gap``, ``noisy_gap_low`` and
-    ``noisy_gap_high`` are replaced by the gap in the world with noise.
+    The frame is indexed by the titles of methods. The columns ``gap_in_noise``,
+    ``gap_in_noise_low`` and ``gap_in_noise_high`` are the gap in the world with noise.
     """
     paper, noise = (TABLES["ranking"](study.worlds[world]) for world in ("", NOISE))
     ends = "", "_low", "_high"
     of_noise = noise[[f"gap{end}" for end in ends]].reindex(paper.index)
-    ranking = paper.assign(**{f"noisy_gap{end}": of_noise[f"gap{end}"] for end in ends})
+    ranking = paper.assign(**{f"gap_in_noise{end}": of_noise[f"gap{end}"] for end in ends})
     return ranking.set_axis(study.methods.title.reindex(ranking.index))
 
 

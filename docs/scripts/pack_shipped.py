@@ -1,10 +1,6 @@
 """Pack shipped results from results folders.
 
     python docs/scripts/pack_shipped.py FOLDER
-    python docs/scripts/pack_shipped.py --noise
-
-The first form packs results folders. The second form executes the shipped solutions with motor
-noise again, and packs them with the new ticks; no method is run.
 
 A folder whose runs have other results than the shipped runs is only packed with ``--changed``. The
 rewards of trials are downsampled (:meth:`coartic.runs.record.Run.downsample`), so that the files
@@ -23,7 +19,6 @@ from pathlib import Path
 
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import compare_runs
-from coartic.benchmarks.scoring import with_noise
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.runs import shipped
@@ -58,13 +53,6 @@ def changed_runs(folder: Path) -> Iterator[str]:
                     yield f"run {run_id}: {change}"
 
 
-def runs_with_noise(source: Store) -> Iterator[Row]:
-    """Yield the runs of a folder, with their solutions executed again with motor noise."""
-    ids = iter(source.runs().run_id)
-    for job in source.plan():
-        yield from with_noise([source.run(next(ids)) for _ in job.numbers])
-
-
 def pack(source: Store, runs: Iterable[Row], out: Path) -> None:
     """Pack runs, with downsampled rewards and the plan of ``source``, into the folder ``out``.
 
@@ -90,16 +78,8 @@ def main() -> int:
     """
     parser = argparse.ArgumentParser(prog="python docs/scripts/pack_shipped.py")
     parser.add_argument("--changed", action="store_true", help="pack results that have changed")
-    parser.add_argument("--noise", action="store_true", help="pack noisy ticks made again")
-    parser.add_argument("folders", nargs="*", type=folder_named, metavar="FOLDER")
+    parser.add_argument("folders", nargs="+", type=folder_named, metavar="FOLDER")
     options = parser.parse_args()
-    if options.noise == bool(options.folders):
-        parser.error("name the folders to pack, or --noise")
-    if options.noise:
-        for suite in shipped.shipped_hashes():
-            with shipped.open_shipped(suite) as source:
-                pack(source, runs_with_noise(source), shipped.SHIPPED_FOLDER)
-        return 0
     try:
         changes = {folder: list(changed_runs(folder)) for folder in options.folders}
     except CoarticError as error:

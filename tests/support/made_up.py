@@ -73,10 +73,10 @@ def row(method, reward, *, task="two-armed-1", run=0, setting="", **more):
         "task": task, "method": method, "setting": setting, "run": run, "seed": run,
         "status": "ok" if reward is not None else "infeasible", "reason": "", "reward": reward,
         "run_id": f"{task}-{method}-{setting}-{run}{more.get('world', '')}", "hands": "LRLR",
-        "noisy_ticks": None if reward is None else -1.1 * reward, "noise_rule": NOISE_RULE,
+        "noise_rule": NOISE_RULE,
         "world": "", "mean_ticks": None, "failed_executions": None, "practice": None,
         "information": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
-        "movement_ticks": 5000, "forward_kinematics": 1_234_567, "jacobians": 950,
+        "movement_ticks": 5000, "forward_kinematics": 1_234_567,
         "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0, "cpu_s": 0.5,
         "warm": run > 0, "together": 1,
         "solution_corrections": 0, "early_corrections": 30, "late_corrections": 20,
@@ -99,7 +99,7 @@ def runs_in_noise(task, method, ticks, world="motor_noise=0.01", **more):
     Those of a failed run are None.
     """
     of_noise = {
-        "mean_ticks": ticks, "noisy_ticks": None, "trials": 10,
+        "mean_ticks": ticks, "trials": 10,
         "failed_executions": [None if each is None else 0 for each in ticks],
         "status": ["infeasible" if each is None else "ok" for each in ticks],
         "practice": "[330, 325, 322, null, 320, 318, 317, 316, 315, 314]",

@@ -33,11 +33,11 @@ from coartic.motion.kernels.slots import Batch, RobotRecord, RunRecord
 from coartic.robot import MAX_ENTRY, Configs, Hands, Points
 
 COUNTED = (
-    *("movement_ticks", "forward_kinematics", "corrective_iterations"),
+    *("movement_ticks", "forward_kinematics", "iterations"),
     *("corrections", "failed_trials"),
 )
-"""Names of the counters of :class:`~coartic.method.Meter` that the kernels update, in the order of
-the columns of the arrays ``counts``."""
+"""Names of what the kernels count, in the order of the columns of the arrays ``counts``. All but
+the iterations of the corrective process are counters of :class:`~coartic.method.Meter`."""
 TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
 GoalRecord = Any
 """Record with the results at one goal of a trial (:func:`goal_record_type`)."""
