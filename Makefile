@@ -1,8 +1,7 @@
 # Two commands set everything up on a machine with Python >= 3.11 (with venv) and make:
 #   make benchmark   the paper's experiments, all methods, the report and the replication
 #   make test        the test suite
-# make benchmark FULL=1 adds the ablations. make docs builds the site; make findings and make
-# studies make the numbers in it again.
+# make benchmark FULL=1 adds the ablations. make docs builds the site.
 PYTHON ?= python3
 VENV   ?= .venv
 OUT    ?= results
@@ -10,12 +9,9 @@ FULL   ?=
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 SUITES := comparison $(if $(FULL),ablations)
-SHIPPED := comparison families
-STUDIES ?= $(filter-out common replication,$(notdir $(wildcard studies/[a-z]*)))
-# Studies, and the pages made from them, import the package studies/common.
 STUDY  := PYTHONPATH=studies $(BIN)/python
 
-.PHONY: benchmark test check format docs shipped shipped-check findings studies speed release-check setup clean
+.PHONY: benchmark test check format docs shipped shipped-check speed release-check setup clean
 
 benchmark: $(READY)
 	@for suite in $(SUITES); do \
@@ -66,29 +62,6 @@ shipped: $(READY)
 	$(BIN)/coartic run families --out $(OUT)/shipped/families
 	$(BIN)/python docs/scripts/pack_shipped.py $(if $(CHANGED),--changed) \
 	  $(OUT)/shipped/comparison $(OUT)/shipped/families
-
-# The suites behind docs/findings.md, and the pages made from them. Shipped runs are not made again.
-findings: $(READY)
-	@for suite in $(SHIPPED); do \
-	  $(BIN)/coartic run $$suite --include shipped --out $(OUT)/$$suite || exit; \
-	done
-	$(BIN)/coartic run ablations --out $(OUT)/ablations
-	$(STUDY) studies/replication/study.py $(SHIPPED:%=$(OUT)/%) $(OUT)/ablations
-	$(STUDY) docs/make_findings.py --from $(OUT)
-
-# Every study, or those of make studies STUDIES="horizon dose": its suite, with its own families,
-# then its tables, figure and page. All of them take over two hours.
-studies: $(READY)
-	@for study in $(STUDIES); do \
-	  files=""; \
-	  for file in studies/$$study/*.v*.toml; do [ -e $$file ] && files="$$files --family-file $$file"; done; \
-	  if [ -e studies/$$study/protocols.py ]; then \
-	    $(STUDY) studies/$$study/protocols.py $(OUT)/$$study; \
-	  elif [ -e studies/$$study/suite.toml ]; then \
-	    $(BIN)/coartic run studies/$$study/suite.toml --out $(OUT)/$$study $$files; fi && \
-	  $(STUDY) studies/$$study/study.py $(OUT)/$$study || exit; \
-	done
-	$(STUDY) docs/make_findings.py
 
 setup: $(READY)
 

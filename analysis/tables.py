@@ -143,7 +143,7 @@ class Column(NamedTuple):
     """True if LaTeX also has the column, which must then have a heading."""
 
 
-def _column_of(line: str) -> Column:
+def column_of(line: str) -> Column:
     """Parse a line of a table's definition, which describes a column.
 
     A line, such as ``gap[] | gap (%) | 1 | tex``, has up to four parts: the name of the column with
@@ -204,11 +204,11 @@ def table(
     caption : str
         Caption (:attr:`Table.caption`).
     columns : str
-        A line for each column (:func:`_column_of`).
+        A line for each column (:func:`column_of`).
     with_settings : bool
         True to show also settings and ablations (:attr:`Table.with_settings`).
     """
-    parts = [_column_of(line) for line in columns.splitlines() if line.strip()]
+    parts = [column_of(line) for line in columns.splitlines() if line.strip()]
 
     def as_table(rows: Callable[[Study], Rows]) -> Table:
         with_ids = *parts, Column("run_ids")
@@ -387,12 +387,12 @@ def shown_columns(
                 heading += " ± SD"
             elif len(of_number) > 1 and not np.isnan(rows[:, 1]).all() and "[" not in heading:
                 heading += f" [95{NARROW_SPACE}%]"
-            texts = [_number_text(column, *row) for row in rows.tolist()]
+            texts = [number_text(column, *row) for row in rows.tolist()]
             shown[name] = ShownColumn(heading, texts, is_number=True)
     return shown
 
 
-def _number_text(column: Column, value: float, *spread: float) -> str:
+def number_text(column: Column, value: float, *spread: float) -> str:
     """Return a number as a string, with its standard deviation or its interval.
 
     ``spread`` is empty, the standard deviation, or the two ends of the interval. A standard

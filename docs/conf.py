@@ -7,7 +7,7 @@ from pathlib import Path
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
-sys.path[:0] = [str(ROOT), str(DOCS), str(ROOT / "studies")]
+sys.path[:0] = [str(ROOT), str(DOCS)]
 
 import coartic  # noqa: E402  (of this checkout)
 

@@ -147,13 +147,14 @@ def traced(tmp_path_factory):
 @pytest.fixture(scope="session")
 def shipped_folder(tmp_path_factory):
     """A folder with the results folders of the suites whose runs ship."""
-    from make_findings import unpack_shipped
+    from store_tables import unpack
 
+    from coartic.runs.shipped import shipped_hashes
     from tests.support.suites import made_once
 
     def make(folder):
-        folder.mkdir()
-        unpack_shipped(folder)
+        for suite in shipped_hashes():
+            unpack(suite, folder / suite)
 
     return made_once(tmp_path_factory, "shipped-results", make)
 
@@ -257,7 +258,7 @@ def visited(browser, pages):
 
 FIRST = (
     *("test_report_page", "test_play_page", "test_report"),
-    *("studies/test_stored_tables", "test_figures", "test_signatures", "test_conformance"),
+    *("test_pages", "test_figures", "test_signatures", "test_conformance"),
     *("test_pool", "test_cli", "test_method_files", "test_runner", "test_cluster"),
 )
 """Modules that begin: those that use one browser and read one report, so that no other worker takes

@@ -12,8 +12,6 @@ import coartic
 from coartic import CoarticError
 from coartic.analysis import ecdf, frames
 from coartic.analysis.signatures import SIGNATURES
-from coartic.analysis.words import p_value
-from common.judging import judge, mean_beyond
 from tests.support.made_up import row, study_of
 
 
@@ -22,11 +20,11 @@ from tests.support.made_up import row, study_of
     [
         *("analysis.figures.plot", "analysis.figures.style", "analysis.frames", "analysis.methods"),
         *("analysis.recordings", "analysis.running_times", "analysis.signatures"),
-        *("analysis.statistics", "analysis.words", "learner.learning", "common.judging"),
+        *("analysis.statistics", "analysis.words", "learner.learning"),
     ],
 )
 def test_examples(module):
-    code = importlib.import_module(module if module.startswith("common") else f"coartic.{module}")
+    code = importlib.import_module(f"coartic.{module}")
     failed, attempted = doctest.testmod(code, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert failed == 0 < attempted
 
@@ -128,25 +126,6 @@ def test_ranked_is_who_solved_all_tasks_of_the_frame():
     assert ranked.tasks.tolist() == [2, 2, 1, 1]
     assert ranked.runs.to_dict() == {"a": 3, "b": 2, "c": 2, "d": 1}
     assert ranked.failed["c"] == 1
-
-
-CARRIED = [-3, -2, -1, 0, 1, 1, 2, 2, 3, 4, 5, 9]
-"""Values whose mean is above 0 because of the last one."""
-
-
-def test_one_task_carries_no_claim_and_refutes_none():
-    """Without it the test is that of the other tasks alone."""
-
-    def judged(values, where):
-        return judge({"": ("", "", mean_beyond("{}", np.array(values), 0, where))}).loc[""]
-
-    every, others = judged(CARRIED, "greater"), judged(CARRIED[:-1], "greater")
-    assert every.p_holm < 0.05 < every.p_without == others.p_holm
-    assert every.verdict == "undecided"
-    assert every.evidence.endswith(f"for it {p_value(every.p_without)}.")
-    opposite = judged(CARRIED, "less")
-    assert opposite.opposite_p_holm == others.p_holm > 0.05
-    assert opposite.verdict == "undecided"
 
 
 def test_searches_with_another_base_have_no_gap():

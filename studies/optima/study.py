@@ -12,7 +12,7 @@ import pandas as pd
 import shipped
 
 from coartic.analysis import figures
-from common.writing import write_study
+from stored import stored_picture, write_tables
 
 BOUNDS = {
     "proven": "proven optimal", "within_1": "bound within 1 %", "within_5": "within 5 %",
@@ -82,5 +82,7 @@ def draw(table):
 
 
 if __name__ == "__main__":
-    tables = tabulate(Path(sys.argv[1])) if sys.argv[1:] else {}
-    write_study(Path(__file__).parent, tables, draw)
+    here = Path(__file__).parent
+    write_tables(here, tabulate(Path(sys.argv[1])) if sys.argv[1:] else {})
+    results = pd.read_csv(here / "results.csv", index_col=0)
+    (here / "figure.svg").write_bytes(stored_picture(draw, results))

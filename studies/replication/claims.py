@@ -13,9 +13,8 @@ import hands
 import pandas as pd
 import performance
 import postures
+from judging import Finding, judge
 from reader import MissingError, Reader
-
-from common.judging import Finding, judge
 
 HERE = Path(__file__).parent
 CLAIMS = pd.DataFrame.from_dict(

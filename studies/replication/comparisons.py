@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from judging import Finding
 from published import Summary
 
 from coartic.analysis import interval, mean, number
 from coartic.analysis.statistics import bootstrap_test, exchange_test
 from coartic.estimates import difference_of_means
-from common.judging import Finding
 
 
 def written(value, digits):

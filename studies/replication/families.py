@@ -6,12 +6,12 @@ from itertools import product
 from statistics import median
 
 from comparisons import Higher, describe_parts, written
+from judging import Finding, all_of, mean_beyond
 from performance import no_trial_fails
 from reader import CONDITIONS, EC1, EC2, EC3, EC4, LEARNER, MARGINS, MissingError
 
 from coartic.analysis import mean, number
 from coartic.estimates import MIN_TASKS
-from common.judging import Finding, all_of, mean_beyond
 
 OF_ONE_ARM = ("one-armed/v1",)
 OF_TWO_ARMS = ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")

@@ -8,11 +8,11 @@ from statistics import mode
 import numpy as np
 import scipy
 from comparisons import written
+from judging import Finding, all_of
 from reader import EC2, EC3, MARGINS, TASK_1, MissingError
 
 from coartic.analysis.statistics import share_test
 from coartic.estimates import Estimate, difference_of_means
-from common.judging import Finding, all_of
 
 FREE_BASE = "two-armed-1.free-base"
 RANDOM_HANDS = "random-search/hands"

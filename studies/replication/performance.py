@@ -9,12 +9,12 @@ from operator import itemgetter
 import numpy as np
 import scipy
 from comparisons import Higher, Measurement, all_higher, all_positive
+from judging import Finding
 from reader import CELLS_OF_ONE_ARM, CELLS_OF_TWO_ARMS, EC1, EC3, EC4, MARGINS, ONE_ARMED, TWO_ARMED
 
 from coartic.analysis import number
 from coartic.analysis.signatures import movable
 from coartic.estimates import SEED, Estimate
-from common.judging import Finding
 
 LEAST_DISPLACEMENT = "trajectory-optimisation/squared-displacement"
 """Plan with the smallest squared joint displacement, a smoothness cost of Jordan's."""

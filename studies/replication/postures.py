@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 from comparisons import Higher, all_higher
+from judging import Finding
 from published import TRIALS
 from reader import (
     EC1,
@@ -25,7 +26,6 @@ from reader import (
 from coartic.analysis import TwoContexts, contexts_of_control, number
 from coartic.analysis.signatures import posture_difference_below
 from coartic.estimates import SEED, Estimate
-from common.judging import Finding
 
 ONE_GOAL = "posture-based/one-goal", "corrective-alone/given"
 """Methods that consider only the current goal."""

@@ -8,35 +8,34 @@ The folder of suite ``comparison`` comes first. Claims for which it has no runs 
 other folders, of suites ``ablations`` and ``families``.
 
 - With ``--out``, the script writes tables, figures and page.html into that folder.
-- Without ``--out``, it needs all three folders. It writes tables (without ids of runs), figures and
-  README.md into the folder of this study.
-- Without folders, it makes figures and page again from the stored tables.
+- Without ``--out``, it needs all three folders. It writes tables (without ids of runs) and figures
+  into the folder of this study; ``docs/scripts/fill_tables.py`` then fills its page.
+- Without folders, it makes the figures again from the stored tables.
 """
 
 import argparse
-import re
 from pathlib import Path
 
 import pandas as pd
 from claims import CLAIMS, judge_claims
-from markdown_it import MarkdownIt
+from page import page_of
 from rewards import compare_rewards, draw_rewards
 from solutions import draw_solutions, measure_solutions
 
 from coartic.analysis import load
-from common.writing import fill_page, stored_picture
+from stored import stored_picture, write_tables
 
 HERE = Path(__file__).parent
-STYLE = HERE.parents[1] / "analysis" / "report" / "page.css"
-VERDICTS = "not supported", "undecided", "supported"
-"""Verdicts in the order of the page, failures first."""
+VERDICTS = "supported", "undecided", "not supported"
 
 
 def measure(folders):
     """Return the tables of results folders by name."""
     studies = [load(folder).worlds[""] for folder in folders]
+    claims = judge_by_first(studies)
     return {
-        "claims": judge_by_first(studies),
+        "claims": claims,
+        "verdicts": count_verdicts(claims),
         "rewards": compare_rewards(studies[0]),
         "solutions": measure_solutions(studies[0]),
     }
@@ -51,33 +50,31 @@ def judge_by_first(studies):
     return first
 
 
-def rank(verdicts):
-    """Return the position in :data:`VERDICTS` of each entry of a column of verdicts."""
-    return verdicts.map(VERDICTS.index)
+def count_verdicts(claims):
+    """Count the verdicts on judged claims, by the goals that they are about."""
+    judged = claims[claims.suite != ""]
+    drawn = judged.suite == "families"
+    ours = judged.statement.str.contains("†")
+    groups = {"printed": ~drawn & ~ours, "reconstructed": ~drawn & ours, "random tasks": drawn,
+              "all": drawn | ~drawn}  # fmt: skip
+    rows = {
+        name: {
+            f"{prefix}{verdict.replace(' ', '_')}": (judged[column][group] == verdict).sum()
+            for prefix, column in (("", "replicates"), ("beyond_", "more_than_one_selection"))
+            for verdict in VERDICTS
+        }
+        for name, group in groups.items()
+    }
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
 
 
 def write(out):
-    """Draw the figures, and fill in the page, from the tables in a folder.
-
-    In the folder of this study, the page is README.md. In any other folder it is page.html, which
-    also has the evidence of each claim. There, links to the project become names of files, so that
-    the folder can be moved.
-    """
+    """Draw the figures, and make the page of a user's folder, from the tables in a folder."""
     stored = {path.stem: pd.read_csv(path, index_col=0) for path in out.glob("*.csv")}
     for name, draw in (("rewards", draw_rewards), ("solutions", draw_solutions)):
         (out / f"{name}.svg").write_bytes(stored_picture(draw, stored[name]))
-    if out == HERE:
-        text = fill_page(HERE / "README.md.jinja", **stored)
-        (out / "README.md").write_text(text, encoding="utf-8")
-    else:
-        text = fill_page(HERE / "page.md.jinja", rank=rank, **stored)
-        text = re.sub(r"\[([^]]+)\]\(\.\./\.\./([^)#]+)[^)]*\)", r"\1 (`\2`)", text)
-        body = MarkdownIt("commonmark", {"html": True}).enable("table").render(text)
-        body = body.replace("<table>", '<div class="scroll"><table>')
-        body = body.replace("</table>", "</table></div>")
-        page, style = (HERE / "page.html").read_text("utf-8"), STYLE.read_text("utf-8")
-        page = page.replace("{{ style }}", style).replace("{{ body }}", body)
-        (out / "page.html").write_text(page, encoding="utf-8")
+    if out != HERE:
+        (out / "page.html").write_text(page_of(stored), encoding="utf-8")
 
 
 def main():
@@ -88,10 +85,11 @@ def main():
     asked = parser.parse_args()
     asked.out.mkdir(parents=True, exist_ok=True)
     tables = measure(asked.folders) if asked.folders else {}
-    for name, table in tables.items():
-        if asked.out == HERE:
-            table = table.drop(columns="run_ids", errors="ignore")
-        table.to_csv(asked.out / f"{name}.csv", float_format="%.6g", lineterminator="\n")
+    if asked.out == HERE:
+        tables = {
+            name: table.drop(columns="run_ids", errors="ignore") for name, table in tables.items()
+        }
+    write_tables(asked.out, tables)
     write(asked.out)
 
 

@@ -12,12 +12,10 @@ from coartic import load_task
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.study import Study
-from coartic.estimates import Estimate
 from coartic.model import model_from
 from coartic.runs.method_info import BUILT_IN, MethodInfo
 from coartic.runs.plan import Cell, Job
 from coartic.runs.record import NOISE_RULE
-from common.judging import Finding
 
 MADE_WITH = {
     "coartic": "0", "model_code": "code", "commit": {"id": "abc4567", "dirty": True},
@@ -44,19 +42,6 @@ class MadeUp(Study):
 def made(values):
     """Return a method that looks up values by its arguments; those of replays end in ``True``."""
     return lambda *key, replay=False: values[(*key, replay) if replay else key]
-
-
-def found(holds, *p, against=None, n=20):
-    """Return a finding of a claim, with tests of the claim and of its opposite.
-
-    ``p`` are the p-values of the claim. ``against`` are those of its opposite, by default of the
-    other tails.
-    """
-    tests, contrary = (
-        tuple(Estimate(1.0, p=each, n=(n,), resamples=9_999) for each in values)
-        for values in (p, [1 - each + 1e-4 for each in p] if against is None else against)
-    )
-    return Finding(holds, "planted", tests, contrary)
 
 
 def made_up_optima(*tasks):

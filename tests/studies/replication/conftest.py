@@ -1,5 +1,7 @@
 """Shared by the tests of study replication."""
 
+import importlib
+
 import pytest
 
 from coartic import load_task
@@ -35,3 +37,11 @@ def tables(study):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(STUDY, "load", lambda _: study)
         return STUDY.measure([study.folder])
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _fewer_resamples_of_claims():
+    """On which no verdict of a test depends."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(importlib.import_module("judging"), "RESAMPLES_OF_CLAIMS", 4_999)
+        yield

@@ -9,19 +9,34 @@ import pytest
 
 from coartic import corrective_trial, load_task
 from coartic.analysis.signatures import Solutions
-from common.judging import Finding, judge
-from tests.support.made_up import found, row, runs_of, study_of, study_of_solutions
+from coartic.analysis.words import p_value
+from coartic.estimates import Estimate
+from tests.support.made_up import row, runs_of, study_of, study_of_solutions
 from tests.support.processes import programs
 from tests.support.strategies import AS_RELEASED
 
 programs("replication", "study")
-claims, comparisons, performance, reader = map(
-    importlib.import_module, ("claims", "comparisons", "performance", "reader")
+claims, comparisons, judging, performance, reader = map(
+    importlib.import_module, ("claims", "comparisons", "judging", "performance", "reader")
 )
+Finding, judge = judging.Finding, judging.judge
 Higher, all_higher = comparisons.Higher, comparisons.all_higher
 ONE_ARMED = ("ascending", "descending")
 T1, T2 = "two-armed-1", "two-armed-2"
 RANDOM_SEARCH = "random-search"
+
+
+def found(holds, *p, against=None, n=20):
+    """Return a finding of a claim, with tests of the claim and of its opposite.
+
+    ``p`` are the p-values of the claim. ``against`` are those of its opposite, by default of the
+    other tails.
+    """
+    tests, contrary = (
+        tuple(Estimate(1.0, p=each, n=(n,), resamples=9_999) for each in values)
+        for values in (p, [1 - each + 1e-4 for each in p] if against is None else against)
+    )
+    return Finding(holds, "planted", tests, contrary)
 
 
 def judged(monkeypatch, planted):
@@ -514,3 +529,22 @@ def test_the_register_on_runs(study, tables):
     assert sum(map(bool, read.values())) > 8
     for name, tasks in read.items():
         assert not tasks or bool(tasks & {T1, T2}) == claims.CLAIMS.fitted[name], name
+
+
+CARRIED = [-3, -2, -1, 0, 1, 1, 2, 2, 3, 4, 5, 9]
+"""Values whose mean is above 0 because of the last one."""
+
+
+def test_one_task_carries_no_claim_and_refutes_none():
+    """Without it the test is that of the other tasks alone."""
+
+    def judged(values, where):
+        return judge({"": ("", "", judging.mean_beyond("{}", np.array(values), 0, where))}).loc[""]
+
+    every, others = judged(CARRIED, "greater"), judged(CARRIED[:-1], "greater")
+    assert every.p_holm < 0.05 < every.p_without == others.p_holm
+    assert every.verdict == "undecided"
+    assert every.evidence.endswith(f"for it {p_value(every.p_without)}.")
+    opposite = judged(CARRIED, "less")
+    assert opposite.opposite_p_holm == others.p_holm > 0.05
+    assert opposite.verdict == "undecided"

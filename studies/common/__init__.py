@@ -1,1 +1,0 @@
-"""Code that studies share: it judges claims, and writes the files of a study."""
