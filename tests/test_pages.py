@@ -151,7 +151,7 @@ def test_each_number_stands_in_a_table_that_its_section_shows_or_links(name):
 
 
 def test_a_wrong_number_is_found():
-    """Of an interval nearly always (49 of 52 here); of single numbers those that no table has by chance."""
+    """Of an interval nearly always (49 of 52), of single numbers what no table has by chance."""
     page, found = ROOT / "docs" / "findings.md", []
     for section in sections_of(page.read_text("utf-8")):
         for value, low, high in {of for of in numbers_in(section) if len(of) == 3}:

@@ -1,5 +1,7 @@
 """Versions of built-in methods, and the shipped runs of each."""
 
+import hashlib
+import json
 from dataclasses import replace
 
 import check_shipped
@@ -10,12 +12,17 @@ from pydantic import create_model
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.include import include_folders
+from coartic.benchmarks.planning import plan_suite
+from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import compare_runs, perform_runs_again
 from coartic.benchmarks.runner import perform
+from coartic.benchmarks.scoring import score
+from coartic.benchmarks.worker import perform_job
 from coartic.runs.method_info import BUILT_IN, answer, method_info
-from coartic.runs.plan import Cell, cell_of
+from coartic.runs.plan import Cell, Job, cell_of
 from coartic.runs.record import PARTS
+from coartic.runs.store import open_store_for_writing
 from tests.support.suites import InProcess, cell_on, planned, run_and_write
 
 TASK = load_task("two-armed-2")
@@ -80,6 +87,36 @@ def test_a_new_field_at_its_default_changes_no_id():
     shaking = type("Shaking", (custom,), {"Parameters": more})
     assert digests(shaking) == digests(custom) == built_in_digest("dual-process/custom")
     assert digests(shaking, tremor=0.1) != digests(custom)
+
+
+def test_withdrawn_parameters_stay_in_ids():
+    """Of all runs of two suites, as version 7.0.0 made them."""
+    ids = [job.run_id(0) for suite in ("comparison", "families") for job in plan_suite(suite)]
+    assert len(ids) == 5238
+    text = json.dumps(sorted(ids)).encode()
+    assert hashlib.sha256(text).hexdigest().startswith("465790709ccc413c88e889dff79aaec5")
+
+
+def test_a_run_with_a_withdrawn_parameter_is_read_and_not_made_again(tmp_path, coartic):
+    """The folder is one in which 7.0.0 made a run with another value."""
+    info = built_in()["dual-process/EC1-informed"]
+    cell = replace(cell_of(load_task("ascending"), info, {"trials": 20}), parameters={})
+    cell = replace(cell, parameters=info.complete({"trials": 20}) | {"pull": 0.5})
+    assert "pull=0.5" in cell.setting
+    job = Job(cell, 0, range(1), 60.0, "own", 20)
+    folder = tmp_path / "old"
+    plain = Job(cell_of(load_task("ascending"), info, {"trials": 20}), 0, range(1), 60.0, "own", 20)
+    outcomes = [perform_job(plain)[0]]
+    with open_store_for_writing(folder) as store:
+        store.replace_plan([job], made_with())
+        store.write(score(job, outcomes))
+    runs = load(folder).runs
+    assert runs.setting.str.contains("pull=0.5").all()
+    assert coartic("verify", folder)[0] == 0
+    code, _, error = coartic("verify", folder, "--run", runs.run_id[0])
+    assert (code, "coartic 7.0.0 (commit a0cf376b) makes such runs" in error) == (2, True)
+    with pytest.raises(CoarticError, match="pull is 0.5, but this parameter was withdrawn"):
+        info.complete({"pull": 0.5})
 
 
 def built_in_digest(name):

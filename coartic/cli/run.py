@@ -289,6 +289,7 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     """Yield a description of a method, as pairs of a heading and a text (:func:`.say_pairs`)."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
+    from coartic.runs.method_info import WITHDRAWN
     from coartic.runs.plan import describe_parameters
 
     applies = (
@@ -297,7 +298,9 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     yield "Method", f"{info.name}: {info.title}"
     yield "Called", title_of(info)
     yield "Information", ", ".join(info.information)
-    yield "Parameters", describe_parameters(info.defaults) or "none"
+    withdrawn = WITHDRAWN.get(info.name, {})
+    defaults = {name: value for name, value in info.defaults.items() if name not in withdrawn}
+    yield "Parameters", describe_parameters(defaults) or "none"
     yield "Tasks", ", ".join(applies) or "none of the paper's tasks"
     yield "Runs", "depend on the seed" if info.stochastic else "do not depend on the seed"
     yield "Tuned on", info.tuned_on or "not stated"

@@ -8,20 +8,15 @@ A condition defines
 
 *Informed conditions* combine informed and uninformed search, which the paper leaves to "future
 research" (section *Integrating Informed and Uninformed Search*). They use null-space projection to
-move the base and the chosen arm towards a preferred posture, in one or two places. With gain κ
-(field ``drift``) above 0, the mean of exploration, which in the paper is the stored target t,
-becomes ::
+move the base and the chosen arm towards a preferred posture. With gain κ (field ``drift``) above 0,
+the mean of exploration, which in the paper is the stored target t, becomes ::
 
     t + κ N(t) (p - t)
 
-With gain β (field ``pull``) above 0, each iteration of the corrective process adds to the
-configuration x the term ::
-
-    β N(x) (p - x)
-
 Here
 
-- p is the preferred posture, which is chosen when a goal becomes current;
+- p is the preferred posture: halfway from the robot's configuration, when a goal becomes current,
+  to the stored target of the next goal; the configuration itself if there is no such target;
 - N = I − J⁺J is the projection onto the null space of the Jacobian J of the chosen hand. Like the
   paper's distance in joint space, the projection mixes lengths and angles.
 
@@ -38,19 +33,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import (
-    ConfigDict,
-    Field,
-    ValidationError,
-    ValidatorFunctionWrapHandler,
-    WrapValidator,
-)
+from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import unknown
-from coartic.internal.validation import describe_validation_errors, described_error
+from coartic.internal.validation import describe_validation_errors
 from coartic.robot import HANDS, Hand
 
 if TYPE_CHECKING:
@@ -63,28 +52,6 @@ condition, or ``custom``."""
 MAX_NOISE = 100.0
 """Largest allowed standard deviation of exploration noise, in length units and rad."""
 Share = Annotated[float, Field(ge=0, le=1)]
-Drift = Annotated[float, Field(ge=0, le=10)]
-
-
-def _one_or_many(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
-    """Validate field ``drift``: a number, or a tuple of numbers.
-
-    For any other value, a single validation error is raised. Without this function pydantic would
-    raise two: one that the value is not a number, and one that it is not a tuple.
-    """
-    try:
-        return validate(value)
-    except ValidationError:
-        raise described_error(
-            f"drift is {brief_value(value)}; it must be a number from 0 to 10, or a list of such "
-            "numbers"
-        ) from None
-
-
-Drifts = Annotated[
-    Drift | Annotated[tuple[Drift, ...], Field(min_length=1, strict=False)],
-    WrapValidator(_one_or_many),
-]
 
 
 @describe_validation_errors
@@ -114,15 +81,13 @@ class ExplorationCondition:
     modify_other: bool
     """True if noise is added to the targets of the other arm (AModOther). If False, movements to
     stored targets do not move the other arm."""
-    hand_exploration: Literal["none", "closest", "random", "nearest-posture"]
+    hand_exploration: Literal["none", "closest", "random"]
     """Which hand is tried for a goal when the hand is explored, which happens with probability
     ``epsilon``:
 
     - ``"none"``: hands are not explored;
     - ``"closest"``: the hand closest to the goal, or a random hand if both are equally close;
-    - ``"random"``: a random hand (DASel);
-    - ``"nearest-posture"``: the hand for which the posture that the corrective process finds at the
-      goal is nearest to the present posture in joint space.
+    - ``"random"``: a random hand (DASel).
     """
     epsilon: Share = 0.2
     """ε: probability with which the hand for a goal is explored (published)."""
@@ -137,51 +102,14 @@ class ExplorationCondition:
     exploration that is made after the last trial (``"replay"``)."""
     credit: Literal["overall", "subtask"] = "overall"
     """Credit assignment: from which reward the value Q(s, a) is learned at a goal. It is the reward
-    R of the whole trial (``"overall"``), or the return of the goal (``"subtask"``; ``discount``
-    defines the return)."""
-    discount: Share = 0.0
-    """Discount factor γ. The return of goal g is the sum of γ^|h − g| r_h over goals h
-    (``counted``), where r_h is the reward of the movements to goal h. With γ = 0 the return is r_g,
-    the reward of the subtask itself. A value above 0 needs credit ``"subtask"``.
-    """
-    counted: Literal["later", "all"] = "later"
-    """Goals h over which the return of goal g is summed: g and all later goals (``"later"``), or
-    all goals of the trial (``"all"``, which needs credit ``"subtask"``). With ``"all"`` and γ = 1
-    each return is R."""
-    drift: Drifts = 0.0
+    R of the whole trial (``"overall"``), or that of the movements to the goal (``"subtask"``)."""
+    drift: Annotated[float, Field(ge=0, le=10)] = 0.0
     """κ, gain of null-space exploration: the fraction of the null-space displacement to the
-    preferred posture by which the mean of exploration is moved. If κ is a tuple, one of its numbers
-    is drawn at random for each trial after trial 0."""
-    pull: Share = 0.0
-    """β, gain of null-space correction: the fraction of the null-space displacement to the
-    preferred posture that each iteration of the corrective process adds, in all trials after trial
-    0."""
-    direction: Literal["next-goal", "stay", "start"] = "next-goal"
-    """The preferred posture:
-
-    - ``"next-goal"``: halfway from the robot's configuration to the stored target of the next goal;
-      if there is no such target, the same as ``"stay"``;
-    - ``"stay"``: the configuration of the robot when the goal becomes current;
-    - ``"start"``: the configuration at the start of the trial, as a control with wrong information.
-    """
+    preferred posture by which the mean of exploration is moved."""
 
     def __post_init__(self) -> None:
         if len({*self.hands}) < len(self.hands):
             raise ValueError(f"hands names the same hand twice: {', '.join(self.hands)}")
-        if self.discount and self.credit == "overall":
-            raise ValueError(
-                f"discount is {self.discount}, but only the rewards of subtasks can be discounted: "
-                "set credit to 'subtask'"
-            )
-        if self.counted == "all" and self.credit == "overall":
-            raise ValueError(
-                "counted is 'all', but only the returns of subtasks add up rewards of goals: set "
-                "credit to 'subtask'"
-            )
-        if self.direction != "next-goal" and not self.is_informed:
-            raise ValueError(
-                f"direction={self.direction!r} has no effect unless drift or pull is above 0"
-            )
         if self.credit == "subtask" and self.learned == "best":
             raise ValueError(
                 "credit is 'subtask', so the learner does not compare whole trials and cannot know "
@@ -189,14 +117,9 @@ class ExplorationCondition:
             )
 
     @property
-    def drifts(self) -> tuple[float, ...]:
-        """The values of ``drift`` (κ) as a tuple, even if there is only one."""
-        return self.drift if isinstance(self.drift, tuple) else (self.drift,)
-
-    @property
     def is_informed(self) -> bool:
-        """True if ``drift`` or ``pull`` is not 0, so that a preferred posture is used."""
-        return any(self.drifts) or self.pull > 0
+        """True if ``drift`` is not 0, so that a preferred posture is used."""
+        return self.drift > 0
 
     def inapplicable_reason(self, task: Task | Outline) -> str | None:
         """Return why the condition does not fit a task's hands; None if it fits."""

@@ -8,21 +8,19 @@ and moves to it. If the hand misses the goal, the corrective process **A** moves
 The learner stores a table keyed by state (the goal and the previous hand) and hand. An entry
 consists of the value Q and the target q*. In each state that a completed trial passed through, the
 trial is compared with all earlier completed trials that chose the same hand in this state. They are
-compared by their total rewards or, in an ablation, by their returns of the goal. If the trial is
-better than all of these earlier trials, its reward (or return) and its configuration at the goal
-replace Q and q* in the table.
+compared by their total rewards or, in an ablation, by their rewards of the movements to the goal.
+If the trial is better than all of these earlier trials, its reward and its configuration at the
+goal replace Q and q* in the table.
 
 One call of a compiled kernel by :mod:`coartic.learner.learning` makes many runs side by side: the
 outer loop is over trials, then over goals, then over runs. Each run draws random numbers from its
 own NumPy generator (``default_rng(seed)``, PCG64), in this order:
 
-1. at the beginning of each trial after trial 0, if the condition has several values of ``drift``: a
-   uniform number that chooses one of these values;
-2. at each goal of such a trial, up to the first goal that is missed, if hands are explored: a
-   uniform number that is compared with ε;
-3. at the same goal, if that number is below ε and a hand is chosen at random: a uniform number that
+1. at each goal of a trial after trial 0, up to the first goal that is missed, if hands are
+   explored: a uniform number that is compared with ε;
+2. at the same goal, if that number is below ε and a hand is chosen at random: a uniform number that
    chooses the hand;
-4. at the same goal, if a target is stored: a standard normal number for each explored entry of the
+3. at the same goal, if a target is stored: a standard normal number for each explored entry of the
    configuration, in the order of ``q``.
 
 Runs share no data, so that the result of a run depends neither on the other runs nor on their
@@ -49,11 +47,7 @@ from coartic.motion.kernels.compile import (
     joint_lever,
     record_type,
 )
-from coartic.motion.kernels.correct import (
-    correct_runs,
-    correct_slots,
-    project,
-)
+from coartic.motion.kernels.correct import correct_runs, project
 from coartic.motion.kernels.move import MOVE, move_runs
 from coartic.motion.kernels.slots import (
     Batch,
@@ -61,14 +55,11 @@ from coartic.motion.kernels.slots import (
     RunRecord,
     arm_of,
     batch_for,
-    load,
-    squared_distance,
     width_of,
 )
 from coartic.motion.kernels.trial import (
     CORRECTIONS,
     COUNTED,
-    ITERATIONS,
     TICKS,
     begin,
     count_goal,
@@ -84,10 +75,7 @@ from coartic.tasks.task import Task
 
 NO_HAND = 2  # the paper's ∅, the previous hand before goal 1
 _RANDOM = 1
-_NEAREST_POSTURE = 3
-_EXPLORATION = {"none": 0, "random": _RANDOM, "closest": 2, "nearest-posture": _NEAREST_POSTURE}
-_NEXT_GOAL, _STAY = 0, 1
-_DIRECTION = {"next-goal": _NEXT_GOAL, "stay": _STAY, "start": 2}
+_EXPLORATION = {"none": 0, "random": _RANDOM, "closest": 2}
 _EQUALLY_NEAR = 1e-9  # difference of distances that counts as rounding, in length units
 TENTHS = 10
 """Number of parts of the trials after trial 0 for which corrections are counted separately."""
@@ -115,7 +103,7 @@ class LearnerParameters(NamedTuple):
     """True for each entry of a configuration to which noise is added, shape ``(2, width)``. Row h
     holds if hand h (0 left, 1 right) is chosen."""
     exploration: int
-    """Exploration of the hand: 0 none, 1 random, 2 closest, 3 nearest posture."""
+    """Exploration of the hand: 0 none, 1 random, 2 closest."""
     epsilon: float
     """ε: probability with which the hand for a goal is explored."""
     noise_sd: float
@@ -123,19 +111,10 @@ class LearnerParameters(NamedTuple):
     corrects: bool
     """True if **A** corrects a goal that a movement to a stored target misses."""
     by_subtask: bool
-    """True if Q of a goal is learned from the return of the goal, not from the reward of the
-    trial."""
-    discount: float
-    """Discount factor γ in the return of a goal."""
-    counts_earlier: bool
-    """True if the return of a goal includes the rewards of earlier goals."""
-    nullspace_exploration_gains: Array
-    """Values of κ, shape ``(K,)``; if K > 1, one of them is drawn for each trial after trial 0."""
-    nullspace_correction_gain: float
-    """β: fraction of the null-space displacement to the preferred posture that an iteration of
-    **A** adds."""
-    direction: int
-    """Kind of the preferred posture: 0 next goal, 1 stay, 2 start."""
+    """True if Q of a goal is learned from the reward of the movements to the goal, not from the
+    reward of the trial."""
+    nullspace_gain: float
+    """κ: gain of null-space exploration."""
 
 
 class Results(NamedTuple):
@@ -168,8 +147,6 @@ class _Workspace(NamedTuple):
     batch: Batch
     counts: NDArray[np.int64]
     """Counts of the trial, shape ``(N, 5)``."""
-    returns: Array
-    """Returns of the goals of a trial, shape ``(G,)``."""
     xs: Array
     """x of shoulder, joints and hand, shape ``(n + 1,)`` for the longer arm."""
     ys: Array
@@ -211,11 +188,7 @@ def learner_parameters(
         noise_sd=condition.noise_sd,
         corrects=condition.corrects,
         by_subtask=condition.credit == "subtask",
-        discount=condition.discount,
-        counts_earlier=condition.counted == "all",
-        nullspace_exploration_gains=np.array(condition.drifts if condition.is_informed else (0.0,)),
-        nullspace_correction_gain=condition.pull,
-        direction=_DIRECTION[condition.direction],
+        nullspace_gain=condition.drift,
     )
 
 
@@ -237,7 +210,6 @@ def workspace_for(runs: int, task: Task) -> _Workspace:
     return _Workspace(
         batch=batch_for(task.robot, runs),
         counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),
-        returns=np.empty(len(task.goals)),
         xs=np.empty(task.robot.max_links + 1),
         ys=np.empty(task.robot.max_links + 1),
         jacobian=np.zeros((3, width_of(task.robot))),
@@ -257,32 +229,6 @@ def distance_to_goal(run: RunRecord, hand: int, robot: RobotRecord, workspace: _
     dx = run.goal[0] - workspace.xs[tip]
     dy = run.goal[1] - workspace.ys[tip]
     return math.sqrt(dx * dx + dy * dy)
-
-
-@inlined
-def _nearest_posture(
-    n: int, robot: RobotRecord, learner: LearnerParameters, workspace: _Workspace
-) -> int:
-    """Return the hand whose posture at the goal is nearest to the present posture.
-
-    The posture of a hand at the goal of run ``n`` is the one that the corrective process **A**
-    finds. Distances are Euclidean in joint space. At a tie, and if **A** fails with all hands, the
-    result is the first hand. Iterations and evaluations are counted. The run does not move, but
-    ``hand``, ``converged``, ``iterations`` and ``evaluations`` of its record change in place.
-    """
-    nearest, batch, least = learner.hands[0], workspace.batch, math.inf
-    run = batch.runs[n]
-    for hand in learner.hands:
-        run.hand, run.iterations = hand, 0
-        fill_row(run.target, run.q)
-        load(batch.slots[0], 0, n, run, arm_of(robot, hand))
-        correct_slots(batch, 1, robot)
-        workspace.counts[n, ITERATIONS] += run.iterations
-        square = squared_distance(run)
-        if run.converged and square < least:
-            nearest, least = hand, square
-    fill_row(run.target, run.q)
-    return int(nearest)
 
 
 @inlined
@@ -306,16 +252,11 @@ def choose_hand(
 
     The choice is the hand with the highest value Q in ``entries``, a record for each hand; at a tie
     the left hand. If ``explore`` is True and the condition explores hands, the choice is instead,
-    with probability ε, one of
-
-    - a random hand;
-    - the hand closest to the goal, or a random hand if both are equally close;
-    - the hand whose posture at the goal is nearest.
+    with probability ε, a random hand, or the hand closest to the goal (a random hand if both are
+    equally close).
     """
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
-        if learner.exploration == _NEAREST_POSTURE:
-            return _nearest_posture(n, robot, learner, workspace)
         nearest, is_random = hands[0], learner.exploration == _RANDOM
         if not is_random:
             least = distance_to_goal(run, nearest, robot, workspace)
@@ -332,32 +273,25 @@ def choose_hand(
 def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) -> None:
     """Set the preferred posture p of a run, in place.
 
-    The kernel calls this after the hand for a goal is chosen. The learner's ``direction`` decides
-    what p is:
-
-    - *stay*: the present posture q;
-    - *start*: the posture at the start of the trial;
-    - *next goal*: (q + t') / 2. Here t' is the target that is stored for the next goal and for the
-      hand with the highest value Q at the next goal. If there is no next goal or no stored target,
-      p is q. In the entries that are not explored with that hand, p is q as well.
+    The kernel calls this after the hand for a goal is chosen. p is (q + t') / 2. Here q is the
+    present posture, and t' the target that is stored for the next goal and for the hand with the
+    highest value Q at the next goal. If there is no next goal or no stored target, p is q. In the
+    entries that are not explored with that hand, p is q as well.
 
     ``number`` is the index of the goal, from 0. ``table`` is an array of records with the fields
     ``value`` and ``target``, shape ``(G, 3, 2)``; its axes are goal, previous hand (0 left, 1
-    right, 2 none) and hand. If both null-space gains of the run are 0, nothing changes.
+    right, 2 none) and hand. If κ is 0, nothing changes.
     """
-    if run.nullspace_exploration_gain == 0.0 and run.nullspace_correction_gain == 0.0:
+    if learner.nullspace_gain == 0.0:
         return
     fill_row(run.preferred, run.q)
-    if learner.direction == _NEXT_GOAL:
-        if number + 1 < len(table):
-            hand = _best_hand(table[number + 1, run.hand], learner.hands)
-            following = table[number + 1, run.hand, hand]
-            if following.value > -math.inf:
-                for j in range(len(run.q)):
-                    if learner.explored[hand, j]:
-                        run.preferred[j] = 0.5 * (run.q[j] + following.target[j])
-    elif learner.direction != _STAY:
-        fill_row(run.preferred, learner.start)
+    if number + 1 < len(table):
+        hand = _best_hand(table[number + 1, run.hand], learner.hands)
+        following = table[number + 1, run.hand, hand]
+        if following.value > -math.inf:
+            for j in range(len(run.q)):
+                if learner.explored[hand, j]:
+                    run.preferred[j] = 0.5 * (run.q[j] + following.target[j])
 
 
 @inner
@@ -367,11 +301,11 @@ def explore_nullspace(
     """Move the mean of exploration, the run's ``target`` t, in place.
 
     Base and chosen arm move by κ N(t) (p − t), and an idle arm that is explored moves by κ (p − t).
-    κ is the run's ``nullspace_exploration_gain``, p the preferred posture, and N projects onto the
-    null space of the hand's Jacobian. Entries that are not explored do not change; nothing
-    changes if κ is 0.
+    κ is the learner's ``nullspace_gain``, p the preferred posture, and N projects onto the null
+    space of the hand's Jacobian. Entries that are not explored do not change; nothing changes if κ
+    is 0.
     """
-    if run.nullspace_exploration_gain == 0.0:
+    if learner.nullspace_gain == 0.0:
         return
     x, y, v = workspace.jacobian
     arm = arm_of(robot, run.hand)
@@ -390,10 +324,10 @@ def explore_nullspace(
                 x[j], y[j] = joint_lever(workspace.xs, workspace.ys, k, tip)
                 v[j] = change
             else:
-                run.target[j] += run.nullspace_exploration_gain * change
+                run.target[j] += learner.nullspace_gain * change
     project(v, x, y)
     for j in range(len(run.q)):
-        run.target[j] += run.nullspace_exploration_gain * v[j]
+        run.target[j] += learner.nullspace_gain * v[j]
 
 
 @inlined
@@ -456,11 +390,6 @@ def make_trial(
     batch, counts, runs, initial = workspace.batch, workspace.counts, len(tables), trial == 0
     for n in range(runs):
         set_off(batch.runs[n], learner.start, seeds[n], trial, robot)
-        if explore and not initial:
-            gains, rng = learner.nullspace_exploration_gains, generator_at(rngs, n)
-            choice = int(rng.random() * len(gains)) if len(gains) > 1 else 0
-            batch.runs[n].nullspace_exploration_gain = gains[choice]
-            batch.runs[n].nullspace_correction_gain = learner.nullspace_correction_gain
         for k in range(counts.shape[1]):
             counts[n, k] = 0
     for number in range(len(learner.goals)):
@@ -480,29 +409,10 @@ def make_trial(
             records[n, number].moved = batch.runs[n].ticks
             if batch.runs[n].action == MOVE:
                 fill_row(records[n, number].target, batch.runs[n].target)
-        informed = not initial and learner.nullspace_correction_gain != 0.0
-        correct_runs(runs, informed, robot, batch)
+        correct_runs(runs, robot, batch)
         for n in range(runs):
             record_goal(batch.runs[n], records[n, number].moved, records[n, number])
             count_goal(records[n, number], counts[n])
-
-
-@inlined
-def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
-    """Compute the return of each goal of a completed trial, in place.
-
-    ``returns``, shape ``(G,)``, becomes Σ γ^|h − g| r_h for each goal g, where r_h is minus the
-    ticks of goal h. The sum is over goals h from g on, or over all goals if the condition includes
-    earlier goals.
-    """
-    earlier, later = 0.0, 0.0
-    for number in range(len(trial)):
-        returns[number] = earlier
-        if learner.counts_earlier:
-            earlier = learner.discount * (earlier - trial[number].ticks)
-    for number in range(len(trial) - 1, -1, -1):
-        later = learner.discount * later - trial[number].ticks
-        returns[number] += later
 
 
 @inlined
@@ -524,9 +434,9 @@ def _learn_from(
     """Enter a trial of each run into the results, and learn from it.
 
     ``number`` is the number of the trial, from 0. In each state that a completed trial passed
-    through, its reward (or its return of the goal) is compared with Q of the hand that it chose. If
-    the reward (or return) is higher, it replaces Q in ``tables``, and the configuration at the hit
-    replaces q*.
+    through, its reward (or, by subtask, that of the movements to the goal) is compared with Q of
+    the hand that it chose. If the reward is higher, it replaces Q in ``tables``, and the
+    configuration at the hit replaces q*.
     """
     later_trials = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // later_trials
@@ -543,10 +453,8 @@ def _learn_from(
             continue
         if number == 0:
             _copy_accounts(trial, results.initial_accounts[n])
-        if learner.by_subtask:
-            _find_returns(trial, learner, workspace.returns)
         for goal in range(len(trial)):
-            credit = workspace.returns[goal] if learner.by_subtask else float(reward)
+            credit = float(-trial[goal].ticks if learner.by_subtask else reward)
             previous = trial[goal - 1].hand if goal > 0 else NO_HAND
             learned = tables[n, goal, previous, trial[goal].hand]
             if credit > learned.value:

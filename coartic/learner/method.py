@@ -56,8 +56,7 @@ class CustomParameters(DualProcessParameters):
     def check_condition(self) -> Self:
         """Check the condition that the parameters describe, and return the parameters.
 
-        Raises ValueError if the condition contradicts itself, such as a discount without credit for
-        subtasks.
+        Raises ValueError if the condition contradicts itself.
         """
         _condition_of(CONDITIONS[self.base], self)
         return self
@@ -163,8 +162,7 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
     """Make the class of the learner under an exploration condition.
 
     The class is a subclass of :class:`DualProcess`. The parameters are ``trials``, ``noise_sd`` and
-    ``epsilon``. For an informed condition, ``drift``, ``pull`` and ``direction`` are parameters,
-    too. For a condition with credit for subtasks, ``discount`` and ``counted`` are parameters, too.
+    ``epsilon``; for an informed condition ``drift``, too.
     """
     names = ["epsilon", "noise_sd"]
     base, _, change = condition.id.partition("-")
@@ -176,14 +174,13 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
     if condition.is_informed:  # null-space motion, towards postures on short paths
         information |= {Information.JACOBIAN, Information.REWARD_FORMULA}
-        names += ["drift", "pull", "direction"]
+        names += ["drift"]
         title = f"informed learner {base}"
         facts = replace(facts, algorithm="informed learner", short=f"informed {base}")
     if condition.hand_exploration == "closest":  # to find the closest hand
         information |= {Information.GOALS, Information.FORWARD_KINEMATICS}
     if condition.credit == "subtask":
         information |= {Information.REWARD_BY_SUBTASK}
-        names += ["discount", "counted"]
         facts = replace(facts, works=(*facts.works, "dietterich2000"))
     fields: Any = {name: (_FIELDS[name], getattr(condition, name)) for name in names}
 
@@ -209,7 +206,7 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
                 **fields,
             ),
             "condition": condition,
-            "tuned_on": _DRIFT_TUNED_ON if condition.drifts[-1] else DualProcess.tuned_on,
+            "tuned_on": _DRIFT_TUNED_ON if condition.drift else DualProcess.tuned_on,
         },
     )
 

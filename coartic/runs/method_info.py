@@ -39,6 +39,15 @@ ALWAYS_IN_IDS = frozenset(
 """Names of parameters that are always hashed for the id of a run. Do not add names. Any other
 parameter is hashed only if its value is not the default. Therefore a new parameter of a method, or
 a new field of an exploration condition, does not change the ids of existing runs."""
+_INFORMED = {"pull": 0.0, "direction": "next-goal"}
+_SUBTASK = {"discount": 0.0, "counted": "later"}
+WITHDRAWN: dict[str, dict[str, Any]] = {
+    **dict.fromkeys(("dual-process/EC1-informed", "dual-process/EC4-informed"), _INFORMED),
+    **dict.fromkeys(("dual-process/EC1-subtask", "dual-process/EC4-subtask"), _SUBTASK),
+    "dual-process/custom": dict.fromkeys([*_INFORMED, *_SUBTASK]),
+}
+"""Dict that maps ids of methods to parameters that they had until version 7.0.0, with the values
+that runs of today's methods have. They stay in ids and stored parameters of runs."""
 VERSION = re.compile(r"\d+\.\d+")
 """Pattern of the field ``code`` of a built-in method: versions of model and method."""
 
@@ -57,7 +66,8 @@ class MethodInfo:
     """True if the results depend on the seed. A method that is not stochastic is run once on each
     task."""
     defaults: dict[str, Any]
-    """Dict that maps each parameter to its default; None for a parameter without a default."""
+    """Dict that maps each parameter to its default; None for a parameter without a default. The
+    dict includes parameters that were withdrawn (:data:`WITHDRAWN`)."""
     origin: str
     """``built in``, or the path of a method file, as a printable line."""
     code: str
@@ -107,7 +117,7 @@ class MethodInfo:
         parameter.
         """
         method = self.load()
-        return method(method.Parameters(**parameters))
+        return method(method.Parameters(**_without_withdrawn(method, parameters)))
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """Return a dict of the parameters that identify a run, as plain data.
@@ -195,6 +205,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         wanted = {key: config.get(key) for key in ("extra", "frozen")}
         return {"quick": dict(method.quick), "config": wanted}
     parameters, *outline = arguments
+    parameters = _without_withdrawn(method, parameters)
     try:
         typed = method.Parameters.model_validate(parameters)
     except ValidationError as error:
@@ -210,7 +221,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
             name: value
             for name, value in values.items()
             if name in ALWAYS_IN_IDS or value != _defaults(method)[name]
-        }
+        } | WITHDRAWN.get(method.name, {})
     task = Outline(*outline)._replace(hands=tuple(outline[3]))
     try:
         return method(typed).inapplicable_reason(task)
@@ -219,6 +230,21 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
             f"method {method.name!r} cannot say whether it applies to task {task.name!r}: "
             f"{error_line(error)}"
         ) from None
+
+
+def _without_withdrawn(method: type[Method], parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return parameters without those of :data:`WITHDRAWN`.
+
+    Raises CoarticError if one of these has another value than runs of today's methods have.
+    """
+    withdrawn = WITHDRAWN.get(method.name, {})
+    for name, value in withdrawn.items():
+        if name in parameters and parameters[name] != value:
+            raise CoarticError(
+                f"method {method.name!r}: {name} is {brief_value(parameters[name])}, but this "
+                "parameter was withdrawn: coartic 7.0.0 (commit a0cf376b) makes such runs"
+            )
+    return {name: parameters[name] for name in parameters if name not in withdrawn}
 
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
@@ -233,7 +259,7 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
         citation=method.citation,
         information=tuple(sorted(item.value for item in method.information)),
         stochastic=method.stochastic,
-        defaults=_defaults(method),
+        defaults=_defaults(method) | WITHDRAWN.get(method.name, {}),
         origin=origin,
         code=code,
         facts=method.facts,

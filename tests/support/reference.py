@@ -160,7 +160,7 @@ def path_of(q, way, target, model):
     return verify.path(q, way, model) if len(way) else verify.straight_path_points(q, target, model)
 
 
-def correct_until_hit(task, q, hand, goal, model, world, **how):
+def correct_until_hit(task, q, hand, goal, model, world):
     """Correct a miss by the corrective process: once, or with noise until the goal is hit.
 
     After 50 corrections, or where the process does not converge, the goal is missed.
@@ -170,9 +170,7 @@ def correct_until_hit(task, q, hand, goal, model, world, **how):
     free[task.robot.joints(hand)] = True
     result = SimpleNamespace(q=q, hit=False, count=0, ticks=0, iterations=0, found=None, rows=[])
     for _ in range(50 if world.sd else 1):
-        found = correct(
-            task.robot, result.q, hand, goal, locked_base=task.locked_base, model=model, **how
-        )
+        found = correct(task.robot, result.q, hand, goal, locked_base=task.locked_base, model=model)
         result.iterations += found.iterations
         if not found.converged:
             break
@@ -188,11 +186,10 @@ def correct_until_hit(task, q, hand, goal, model, world, **how):
     return result
 
 
-def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, preferred=None):
+def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER):
     """Correct a posture as :func:`coartic.motion.doors.correct`.
 
-    The Jacobian is a matrix. Each iteration adds β N(x) (p − x) with the pull β and a preferred
-    posture p.
+    The Jacobian is a matrix.
     """
     free, model = np.ones(robot.dof), model.for_radius()
     free[:2] = ["x" not in locked_base, "y" not in locked_base]
@@ -204,10 +201,6 @@ def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, pref
             return Correction(q, True, iteration)
         step = model.gain * free * (jacobian.T @ error)
         before, q = q, q + step
-        if pull:
-            moving = _moving(robot, hand, free)
-            toward = (preferred - before)[moving]
-            q[moving] += pull * null_space(robot, before, hand, moving) @ toward
         if (q == before).all():  # a stationary point away from the goal: no iteration changes it
             return Correction(q, False, iteration + 1)
     error = goal - robot.forward_kinematics(q, hand)
@@ -229,12 +222,10 @@ def null_space(robot, q, hand, joints):
 
 def preferred_posture(task, condition, q, number, hand, values, targets):
     """Return the preferred posture p at the current goal, for the chosen hand."""
-    if condition.direction == "start":
-        return np.array(task.q0)
     p = np.array(q)
     following = (number + 1, hand)
     stored = {each: values[following, each] for each in HANDS if (following, each) in values}
-    if condition.direction == "next-goal" and number + 1 < len(task.goals) and stored:
+    if number + 1 < len(task.goals) and stored:
         best = max(stored, key=lambda each: stored[each])
         middle = (q + targets[following, best]) / 2
         explores = _explored(task, condition, best)
@@ -273,13 +264,9 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
     visits, ticks_by_goal = [], []
     for trial in range(trials + 1):
         if trial == trials:  # the replay: nothing is learned from it or counted
-            direction = condition.direction if condition.pull else "next-goal"
             greedy = {"hand_exploration": "none", "drift": 0.0, "noise_sd": 0.0}
-            condition, counted = replace(condition, direction=direction, **greedy), iterations
+            condition, counted = replace(condition, **greedy), iterations
         world = World(model, seed, trial)
-        drift = condition.drifts[0]
-        if trial and len(condition.drifts) > 1:
-            drift = condition.drifts[int(rng.random() * len(condition.drifts))]
         q = np.array(task.q0)
         total = 0
         previous = None
@@ -292,13 +279,12 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
             if trial == 0:
                 hand = first_hands[number]
             else:
-                hand, spent = _choose(task, condition, q, goal, state, values, rng, model)
-                iterations += spent
+                hand = _choose(task, condition, q, goal, state, values, rng)
             p = preferred_posture(task, condition, q, number, hand, values, targets)
             has_target = (state, hand) in targets
             if has_target or (trial == 0 and start):
                 if has_target:
-                    target = _explore(task, condition, q, hand, targets[state, hand], rng, drift, p)
+                    target = _explore(task, condition, q, hand, targets[state, hand], rng, p)
                 else:
                     target = start[number].target
                 (end,) = world.end_of(q, [target])
@@ -309,8 +295,7 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
             if not hit:
                 if has_target and not condition.corrects:
                     break
-                pull = condition.pull if trial else 0.0
-                fixed = correct_until_hit(task, q, hand, goal, model, world, pull=pull, preferred=p)
+                fixed = correct_until_hit(task, q, hand, goal, model, world)
                 iterations += fixed.iterations
                 q, total = fixed.q, total - fixed.ticks
                 by_trial[trial] += fixed.count
@@ -332,13 +317,7 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
             for number, (state, hand, reached) in enumerate(visited):
                 credit = total
                 if condition.credit == "subtask":
-                    credit = 0.0
-                    for reward in reversed(subtasks[number:]):
-                        credit = reward + condition.discount * credit
-                    earlier = 0.0
-                    for reward in subtasks[:number] if condition.counted == "all" else []:
-                        earlier = condition.discount * (earlier + reward)
-                    credit += earlier
+                    credit = subtasks[number]
                 value = values.get((state, hand), -math.inf)
                 if credit > value:
                     values[state, hand] = credit
@@ -348,33 +327,27 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
     )
 
 
-def _choose(task, condition, q, goal, state, values, rng, model):
-    """Return the chosen hand, and the iterations of the corrective process for the choice."""
+def _choose(task, condition, q, goal, state, values, rng):
+    """Return the chosen hand."""
     hands = [hand for hand in HANDS if hand in condition.hands]
     if condition.hand_exploration != "none" and rng.random() < condition.epsilon:
-        if condition.hand_exploration == "nearest-posture":
-            locked = task.locked_base
-            each = [correct(task.robot, q, hand, goal, locked_base=locked, model=model)
-                    for hand in hands]  # fmt: skip
-            far = [_distance(found.q, q) if found.converged else math.inf for found in each]
-            return hands[far.index(min(far))], sum(found.iterations for found in each)
         if condition.hand_exploration == "closest":
             near = [_distance(task.robot.forward_kinematics(q, hand), goal) for hand in hands]
             if len(hands) == 1 or abs(max(near) - min(near)) > 1e-9:
-                return hands[int(np.argmin(near))], 0
-        return hands[int(rng.random() * len(hands))], 0
-    return max(hands, key=lambda hand: values.get((state, hand), -math.inf)), 0
+                return hands[int(np.argmin(near))]
+        return hands[int(rng.random() * len(hands))]
+    return max(hands, key=lambda hand: values.get((state, hand), -math.inf))
 
 
-def _explore(task, condition, q, hand, stored, rng, drift, p):
+def _explore(task, condition, q, hand, stored, rng, p):
     other = "left" if hand == "right" else "right"
     target = np.array(stored)
     explored = _explored(task, condition, hand)
-    if drift:
+    if condition.drift:
         projected = _moving(task.robot, hand, explored)
         d = np.where(explored, p - stored, 0.0)
         d[projected] = null_space(task.robot, stored, hand, projected) @ d[projected]
-        target += drift * d
+        target += condition.drift * d
     if not condition.modify_other:
         target[task.robot.joints(other)] = q[task.robot.joints(other)]
     target[explored] += condition.noise_sd * rng.standard_normal(int(explored.sum()))

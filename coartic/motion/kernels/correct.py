@@ -62,30 +62,24 @@ def _find_statuses(slots: SlotArrays, count: int, square: float) -> None:
 
 
 @inlined
-def descend(
-    slots: SlotArrays, count: int, robot: RobotRecord, runs: Any, find_changes: Any
-) -> tuple[int, bool]:
+def descend(slots: SlotArrays, count: int, robot: RobotRecord) -> tuple[int, bool]:
     """Make an iteration of the corrective process in the first ``count`` slots, in place.
 
     Only the configurations of slots whose status is *going on* change. If the iteration does not
-    change the configuration of such a slot, the status becomes *stuck*. ``find_changes`` is as in
-    :func:`descend_to_goals`. Return how many slots have ended, and whether the absolute values of
-    all link angles are certainly below 1e5 rad afterwards.
+    change the configuration of such a slot, the status becomes *stuck*. Return how many slots have
+    ended, and whether the absolute values of all link angles are certainly below 1e5 rad
+    afterwards.
     """
     ended = 0
     large = 0
     tip = len(slots.length)
     gain, free_x, free_y = robot.model.gain, robot.free_x, robot.free_y
-    if find_changes is not None:
-        find_changes(slots, count, robot, runs)
     for i in range(padded_count(count)):
         error_x = slots.goal[0, i] - slots.x[tip, i]
         error_y = slots.goal[1, i] - slots.y[tip, i]
         going = slots.status[i] == GOING
         x = slots.q[0, i] + gain * error_x if free_x else slots.q[0, i]
         y = slots.q[1, i] + gain * error_y if free_y else slots.q[1, i]
-        if find_changes is not None:
-            x, y = x + slots.nullspace_change[0, i], y + slots.nullspace_change[1, i]
         moved = (x != slots.q[0, i]) | (y != slots.q[1, i])
         slots.q[0, i] = x if going else slots.q[0, i]
         slots.q[1, i] = y if going else slots.q[1, i]
@@ -93,8 +87,6 @@ def descend(
             dx, dy = joint_lever(slots.x[:, i], slots.y[:, i], k, tip)
             angle = slots.q[BASE_DOF + k, i]
             turned = angle + gain * (dx * error_x + dy * error_y)
-            if find_changes is not None:
-                turned += slots.nullspace_change[BASE_DOF + k, i]
             moved |= turned != angle
             slots.q[BASE_DOF + k, i] = turned if going else angle
         # A stationary point outside the goal, which the process will not leave.
@@ -105,9 +97,9 @@ def descend(
     return ended, large == 0
 
 
-@inlined
-def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, find_changes: Any) -> None:
-    """Iterate the corrective process in the first ``count`` slots until each has ended.
+@shared
+def correct_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
+    """Iterate the paper's corrective process in the first ``count`` slots until each has ended.
 
     A correction ends when it has converged or failed. It fails if the distance of the hand from the
     goal is not finite, if the configuration no longer changes, or after ``max_iterations``
@@ -118,10 +110,6 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, find_changes:
     - ``target`` gets the base and the arm of the last iterate, while the entries of the other arm
       do not change;
     - ``evaluations`` grows by the number of iterations plus 1.
-
-    ``find_changes`` is None or a kernel ``find_changes(slots, count, robot, runs)``. The kernel
-    sets ``slots.nullspace_change`` to what the next iteration adds to ``slots.q`` in addition to
-    α Jᵀ e, 0 for locked coordinates of the base.
     """
     slots, iteration = batch.slots[0], 0
     square = largest_square(robot.model.correction_tolerance)
@@ -131,7 +119,7 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, find_changes:
         _find_statuses(slots, count, square)
         ended = count
         if iteration < robot.model.max_iterations:
-            ended, small_angles = descend(slots, count, robot, batch.runs, find_changes)
+            ended, small_angles = descend(slots, count, robot)
         if ended > 0:
             for slot in range(count - 1, -1, -1):
                 if slots.status[slot] == GOING and iteration < robot.model.max_iterations:
@@ -179,54 +167,6 @@ def project(v: Any, x: Any, y: Any) -> None:
 
 
 @inner
-def _find_nullspace_changes(slots: SlotArrays, count: int, robot: RobotRecord, runs: Any) -> None:
-    """Set ``slots.nullspace_change`` of the first ``count`` slots: steps to preferred postures.
-
-    The step is β N(q) (p − q), and 0 for locked base coordinates. Here
-
-    - β is the ``nullspace_correction_gain`` of the run in the slot, and p its preferred posture;
-    - q is the slot's configuration; :func:`find_positions` has filled ``x`` and ``y`` for it;
-    - N projects onto the null space of the hand's Jacobian (:func:`project`).
-    """
-    tip = len(slots.length)
-    for i in range(count):
-        run, v = runs[slots.run[i]], slots.nullspace_change[:, i]
-        x, y = slots.jacobian[0, :, i], slots.jacobian[1, :, i]
-        for j in range(BASE_DOF + tip):
-            v[j], x[j], y[j] = 0.0, 0.0, 0.0
-        if robot.free_x:
-            v[0], x[0] = run.preferred[0] - slots.q[0, i], 1.0
-        if robot.free_y:
-            v[1], y[1] = run.preferred[1] - slots.q[1, i], 1.0
-        for k in range(slots.links[i]):
-            j = BASE_DOF + k
-            v[j] = run.preferred[slots.first_joint[i] + k] - slots.q[j, i]
-            x[j], y[j] = joint_lever(slots.x[:, i], slots.y[:, i], k, tip)
-        project(v, x, y)
-        for j in range(BASE_DOF + tip):
-            v[j] *= run.nullspace_correction_gain
-
-
-@shared
-def correct_slots_informed(batch: Batch, count: int, robot: RobotRecord) -> None:
-    """Run the corrective process with null-space steps towards each run's preferred posture.
-
-    The process runs in the first ``count`` slots. The results are written into the records of the
-    runs (:func:`descend_to_goals`).
-    """
-    descend_to_goals(batch, count, robot, _find_nullspace_changes)
-
-
-@shared
-def correct_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
-    """Run the paper's corrective process in the first ``count`` slots.
-
-    The results are written into the records of the runs (:func:`descend_to_goals`).
-    """
-    descend_to_goals(batch, count, robot, None)
-
-
-@inner
 def _load_missed(count: int, robot: RobotRecord, batch: Batch) -> int:
     """Load each run that is to be corrected into a slot, and return the number of these runs.
 
@@ -266,13 +206,12 @@ def _aim_converged(count: int, robot: RobotRecord, batch: Batch) -> None:
 
 
 @inlined
-def correct_runs(count: int, informed: bool, robot: RobotRecord, batch: Batch) -> None:
+def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Correct the first ``count`` runs: phase 4, *correct*.
 
     A run is corrected only if it has missed its goal. The process **A** looks for a configuration
-    that hits the goal, and the robot moves to this configuration. The movement ends as soon as the
-    hand is in the goal. If ``informed`` is True, **A** makes null-space steps
-    (:func:`correct_slots_informed`), otherwise not (:func:`correct_slots`).
+    that hits the goal (:func:`correct_slots`), and the robot moves to this configuration. The
+    movement ends as soon as the hand is in the goal.
 
     - Without noise, a run is corrected once.
     - With noise, the movement can miss the goal. Then the run is corrected again, until it hits the
@@ -290,10 +229,7 @@ def correct_runs(count: int, informed: bool, robot: RobotRecord, batch: Batch) -
         missed = _load_missed(count, robot, batch)
         if missed == 0:
             break
-        if informed:
-            correct_slots_informed(batch, missed, robot)
-        else:
-            correct_slots(batch, missed, robot)
+        correct_slots(batch, missed, robot)
         _aim_converged(count, robot, batch)
         move_acting(count, False, robot, batch)
         for i in range(count):
@@ -304,7 +240,7 @@ def correct_runs(count: int, informed: bool, robot: RobotRecord, batch: Batch) -
 
 @entry
 def correct_kernel(robot: NDArray[np.void], batch: Batch) -> None:
-    """Run the corrective process for the first run of a batch (:func:`descend_to_goals`).
+    """Run the corrective process for the first run of a batch (:func:`correct_slots`).
 
     ``iterations`` of the run is set to 0 first. ``robot`` comes from :func:`robot_parameters`.
     """

@@ -178,10 +178,6 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
         "target": (np.float64, width),  # of a movement, as asked for; where A has ended
         "end": (np.float64, width),  # where the movement ends unless it stops: target with noise
         "preferred": (np.float64, width),  # preferred posture, in length units and rad
-        # Gains of null-space steps to the preferred posture: of the step of exploration, and of
-        # the step in each iteration of the corrective process.
-        "nullspace_exploration_gain": np.float64,
-        "nullspace_correction_gain": np.float64,
         "goal": (np.float64, 2),  # x and y, in length units
         "hand": np.int64,  # the hand that is to hit the goal: 0 left, 1 right
         "world": np.uint64,  # key of the noise: see coartic.motion.kernels.noise
@@ -240,8 +236,6 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "x": (links + 1,),  # of shoulder, joints and hand
         "y": (links + 1,),
         "status": (),
-        "nullspace_change": joints,  # what an iteration of a correction adds to q
-        "jacobian": (2, *joints),
     }
     kinds = dict.fromkeys(("run", "first_joint", "links"), np.int64)
     record = np.dtype(

@@ -243,7 +243,7 @@ def _reach_lot(
                 follow_paths(count, offset, arms.movements[:, g, m], arms.waypoints, robot, batch)
             for i in range(count):
                 goals[offset + i, g, m].moved = batch.runs[i].ticks
-        correct_runs(count, False, robot, batch)
+        correct_runs(count, robot, batch)
         for i in range(count):
             n, moved = offset + i, 0
             for m in range(goals.shape[2]):
