@@ -19,6 +19,7 @@ _MODULES = {
     "consistency": "coartic.analysis.recordings",
     "contexts_of_control": "coartic.analysis.control",
     "ecdf": "coartic.analysis.running_times",
+    "figure": "coartic.analysis.figures.plot",
     "interval": "coartic.analysis.words",
     "lean": "coartic.analysis.signatures",
     "load": "coartic.analysis.study",
@@ -32,6 +33,7 @@ _MODULES = {
     "relative_gaps": "coartic.analysis.frames",
     "shares": "coartic.analysis.frames",
     "solutions_of": "coartic.analysis.recordings",
+    "table": "coartic.analysis.tables",
     "runtimes": "coartic.analysis.running_times",
     "with_control": "coartic.analysis.control",
 }

@@ -6,7 +6,9 @@ import shutil
 import subprocess
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from itertools import pairwise
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -217,3 +219,67 @@ def test_a_part_that_fails_costs_no_other(coartic, traced, tmp_path, monkeypatch
         assert (report / "figures" / f"tasks{ending}").read_bytes() == b"3.4 inches"
     with pytest.raises(CoarticError, match="report holds the report of other results"):
         write_report(traced, report)
+
+
+def own_file(folder, text=None):
+    """The file of the page on reports, or another text."""
+    if text is None:
+        page = (ROOT / "docs" / "howto" / "report.md").read_text("utf-8")
+        section = page.partition("## Your own tables and figures")[2]
+        text = re.search(r"```python\n(.*?)```", section, re.DOTALL)[1]
+    (folder / "own.py").write_text(text, "utf-8")
+    return folder / "own.py"
+
+
+def test_a_file_adds_tables_and_figures(traced, tmp_path, coartic):
+    """In a section of their own, and in all files; and no later report has them."""
+    before = [*TABLES], [*FIGURES]
+    options = "--with", own_file(tmp_path), "--for-paper", "--width", 3.4
+    code, out, error = coartic("report", traced.folder, "--out", tmp_path / "with", *options)
+    assert (code, error) == (0, ""), out
+    page = (tmp_path / "with" / "report.html").read_text("utf-8")
+    assert "Own tables and figures" in page
+    assert "changes of hand" in page
+    rows = pd.read_csv(tmp_path / "with" / "tables" / "changes.csv", index_col=0)
+    runs = traced.runs[traced.runs.status == "ok"]
+    for task, hands in runs.groupby("task").hands:
+        changed = [sum(a != b for a, b in pairwise(each)) for each in hands]
+        assert rows.changes[task] == pytest.approx(np.mean(changed))
+    for name in ("tables/changes.tex", "figures/rewards.svg", "figures/rewards.pdf"):
+        assert (tmp_path / "with" / name).is_file()
+    assert ([*TABLES], [*FIGURES]) == before
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (None, "does not exist"),
+        ("x = 1\n", "own.py makes no table and no figure: use @table or @figure"),
+        ("x = 1\n1 / 0\n", "own.py, line 2: ZeroDivisionError: division by zero"),
+        ("def (\n", "own.py, line 1: SyntaxError: invalid syntax"),
+        ("from coartic.analysis import table\n@table('x', 'a')\ndef list_ranking(study): ...\n",
+         "the id 'ranking' is taken"),
+    ],
+)  # fmt: skip
+def test_a_file_that_adds_nothing_is_refused_before_anything_is_written(
+    traced, tmp_path, coartic, text, words
+):
+    file = tmp_path / "no.py" if text is None else own_file(tmp_path, text)
+    code, _, error = coartic("report", traced.folder, "--out", tmp_path / "r", "--with", file)
+    assert (code, words in error) == (2, True), error
+    assert not (tmp_path / "r").exists()
+
+
+def test_an_own_table_that_fails_costs_no_other(traced, tmp_path, coartic, monkeypatch):
+    monkeypatch.setattr(sections, "attempt", attempt)
+    text = """from coartic.analysis import table
+@table("Wrong", "a | a")
+def list_wrong(study):
+    yield "row", {"b": 1, "run_ids": ""}
+"""
+    file = own_file(tmp_path, text)
+    code, _, error = coartic("report", traced.folder, "--out", tmp_path / "r", "--with", file)
+    assert code == 1
+    assert "Own tables and figures could not be made: " in error
+    assert "only one of them has ['a', 'b']" in error
+    assert (tmp_path / "r" / "tables" / "ranking.csv").is_file()

@@ -51,6 +51,7 @@ def write_report(
     *,
     for_paper: bool = True,
     width: float | None = None,
+    own: Section | None = None,
     watch: Callable[[str], object] = str,
 ) -> tuple[list[str], dict[str, str]]:
     """Write a report into a folder, and replace an earlier report of the same results.
@@ -74,6 +75,8 @@ def write_report(
     width : float, optional
         Width of the SVG and PDF figures, in inches. By default each figure has its usual width: one
         or two columns of a journal.
+    own : Section, optional
+        Section with tables and figures of the user (:func:`.own_section`).
     watch : callable
         Function for showing the progress. It is called with the title of each section before the
         section is made, and with ``TITLE, for print`` before the figures of the section are made
@@ -115,17 +118,19 @@ def write_report(
                     f"{folder} holds the report of other results; choose another folder"
                 )
         failures: dict[str, str] = {}
-        names = {table.id: section.title for section in SECTIONS for table in section.tables}
+        sections_of_all = [*SECTIONS, *([own] if own else [])]
+        names = {table.id: section.title for section in sections_of_all for table in section.tables}
+        tables = TABLES | ({table.id: table for table in own.tables} if own else {})
         shown, first = list[dict[str, Any]](), list[Plot]()
         frames = defaultdict[str, dict[str, pd.DataFrame]](dict)
         texts, files = defaultdict[str, list[str]](list), {"report.html": b""}
         for world, of_world in study.worlds.items():  # all of a world, so that caches are small
             of_page = [sections.section_of_world(of_world)]
             if is_first := not shown:
-                of_page = sections.visible_sections(of_world)
+                of_page = [*sections.visible_sections(of_world), *([own] if own else [])]
                 first = sections.attempt(failures, "Pictures", _first_figures, of_world) or []
             shown += _sections_shown(of_world, of_page, first * is_first, failures, watch)
-            for name, table in TABLES.items():
+            for name, table in tables.items():
                 title = names.get(name, name)
                 frame = sections.attempt(failures, title, table, of_world)
                 if frame is not None and len(frame):

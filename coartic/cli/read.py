@@ -52,6 +52,12 @@ def report(
             words=completion.methods,
         ),
     ] = None,
+    own: Annotated[
+        list[Path] | None,
+        given.option(
+            "FILE", "Python file with your own tables and figures; may be repeated.", "--with"
+        ),
+    ] = None,
 ) -> None:
     """Write the report of a results folder."""
     if width is not None and not for_paper:
@@ -62,8 +68,10 @@ def report(
         out = Path("results" if str(folder) == SHIPPED else "") / folder / "report"
     from coartic.analysis import TABLES
     from coartic.analysis.report.build import write_report
+    from coartic.analysis.report.own import own_section
     from coartic.analysis.study import load
 
+    section = own_section(own or [])
     started = time.monotonic()
     with (
         Display() as display,
@@ -78,14 +86,17 @@ def report(
                 "another one solved all runs"
             )
         files, failures = write_report(
-            study, out, for_paper=for_paper, width=width, watch=display.show
+            study, out, for_paper=for_paper, width=width, own=section, watch=display.show
         )
     counts = Counter(Path(name).suffix for name in files)
     figures = f" and {pluralize(counts['.svg'], 'figure')}" * for_paper
     say(f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
         f"{pluralize(counts['.csv'], 'table')}{figures}.")  # fmt: skip
     for part, reason in failures.items():
-        complain("Error", f"{part} could not be made, because of a bug in coartic: {reason}")
+        if section is not None and part == section.title:
+            complain("Error", f"{part} could not be made: {reason}")
+        else:
+            complain("Error", f"{part} could not be made, because of a bug in coartic: {reason}")
     if failures:
         sys.exit(1)
 
