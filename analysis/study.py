@@ -29,7 +29,7 @@ from coartic.analysis.optima import (
     run_values,
 )
 from coartic.analysis.signatures import SIGNATURES, Solutions
-from coartic.analysis.words import listed, titled_apart
+from coartic.analysis.words import listed, slugs, titled_apart
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import pluralize, unknown
@@ -802,3 +802,12 @@ class Study:
         drawn = {name for name in self.tasks if address_of(name.partition(".")[0]) is not None}
         left_out = drawn if len(drawn) > 8 else ()
         return {name: task for name, task in self.tasks.items() if name not in left_out}
+
+
+def ending_of(study: Study) -> str:
+    """Return the suffix of ids for the world of a study, such as ``-motor-noise-0-01``.
+
+    The ids are those of tables, figures and sections of the page. The suffix is empty for the
+    paper's world. Raises CoarticError for a study of several worlds.
+    """
+    return f"-{slugs([study.world])[study.world]}" if study.world else ""

@@ -15,7 +15,6 @@ from coartic.internal.text import one_line
 
 if TYPE_CHECKING:
     from coartic import Task
-    from coartic.analysis.study import Study
 
 _Digits = Annotated[int, Field(ge=0, le=30)]
 NONE = "–"
@@ -236,15 +235,6 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
             slug = f"{base}-{count}"
         slug_of.setdefault(name, slug)
     return slug_of
-
-
-def ending_of(study: Study) -> str:
-    """Return the suffix of ids for the world of a study, such as ``-motor-noise-0-01``.
-
-    The ids are those of tables, figures and sections of the page. The suffix is empty for the
-    paper's world. Raises CoarticError for a study of several worlds.
-    """
-    return f"-{slugs([study.world])[study.world]}" if study.world else ""
 
 
 def latex(text: object) -> str:

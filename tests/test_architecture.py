@@ -71,6 +71,35 @@ def test_imports_point_one_way():
             assert not any(name.startswith("coartic.cli") for name in imported(path)), path
 
 
+def test_no_module_imports_itself_by_way_of_others():
+    """Imports within functions and imports for types are counted, too."""
+    names = {}
+    for path in sources():
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        parts = parts[: -1 if parts[-1] == "__init__" else None]
+        names[".".join(parts if parts[0] == "coartic" else ("coartic", *parts))] = path
+    imports = {}
+    for name, path in names.items():
+        asked = {each for full in imported(path) for each in (full, full.rpartition(".")[0])}
+        # A package takes names of its own modules.
+        imports[name] = {each for each in asked & {*names} if not each.startswith(f"{name}.")}
+    done, open_now = set(), []
+
+    def visit(name):
+        circle = " -> ".join([*open_now[open_now.index(name) :], name] if name in open_now else [])
+        assert not circle, circle
+        if name not in done:
+            open_now.append(name)
+            for other in sorted(imports[name] - {name}):
+                if not name.startswith(f"{other}."):  # a module of this package
+                    visit(other)
+            open_now.pop()
+            done.add(name)
+
+    for name in names:
+        visit(name)
+
+
 FRESH = """
 import sys
 import coartic

@@ -31,8 +31,8 @@ from coartic.analysis.methods import (
     describe_values,
 )
 from coartic.analysis.standings import reference
-from coartic.analysis.study import Study, check_study
-from coartic.analysis.words import RECONSTRUCTED, capital, ending_of, id_of, number
+from coartic.analysis.study import Study, check_study, ending_of
+from coartic.analysis.words import RECONSTRUCTED, capital, id_of, number
 from coartic.errors import CoarticError
 from coartic.internal.files import describe_os_errors
 from coartic.internal.limits import brief_value

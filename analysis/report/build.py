@@ -21,7 +21,7 @@ from coartic.analysis.report import sections
 from coartic.analysis.report.player import player
 from coartic.analysis.report.sections import IN_NOISE, SECTIONS, Section
 from coartic.analysis.standings import reference
-from coartic.analysis.study import Study
+from coartic.analysis.study import Study, ending_of
 from coartic.analysis.tables import (
     TABLES,
     Table,
@@ -33,7 +33,7 @@ from coartic.analysis.tables import (
     list_not_ranked,
     list_ranking,
 )
-from coartic.analysis.words import ending_of, id_of, listed, marked, number
+from coartic.analysis.words import id_of, listed, marked, number
 from coartic.internal.files import check_inside, describe_os_errors, make_folder, publish
 from coartic.play.page import part_of_page
 from coartic.runs.plan import hash_of, world_title

@@ -48,7 +48,7 @@ from coartic.analysis.standings import (
     solved_tasks,
     standings,
 )
-from coartic.analysis.study import Study
+from coartic.analysis.study import Study, ending_of
 from coartic.analysis.tables import (
     Table,
     is_setting,
@@ -68,7 +68,6 @@ from coartic.analysis.words import (
     NO_BREAK,
     capital,
     commonest,
-    ending_of,
     interval,
     listed,
     marked,

@@ -36,12 +36,11 @@ from coartic.analysis.standings import (
     ranked_tasks,
     reference,
 )
-from coartic.analysis.study import Study, check_study
+from coartic.analysis.study import Study, check_study, ending_of
 from coartic.analysis.words import (
     NARROW_SPACE,
     NONE,
     RECONSTRUCTED,
-    ending_of,
     id_of,
     in_brackets,
     latex,

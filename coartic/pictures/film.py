@@ -13,20 +13,20 @@ import tempfile
 from collections.abc import Callable, Sequence
 from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from coartic.errors import CoarticError
 from coartic.internal.files import check_ending, check_output, describe_os_errors, write_output
 from coartic.internal.text import pluralize
 from coartic.pictures.drawing import box, circle_goals, draw_robot, fill_goals, number_goals
-
-if TYPE_CHECKING:
-    from coartic.pictures.trajectories import Trajectory
+from coartic.robot import Array, Hand
+from coartic.tasks.task import Task
 
 RATE = 12.5
 """Frames per second. In a GIF, a frame must last an integer number of hundredths of a second."""
@@ -40,8 +40,27 @@ _DPI = 100
 _WEIGHT = 2.0  # of lines
 
 
+class Movement(Protocol):
+    """What a film shows: a :class:`.Trajectory`."""
+
+    @property
+    def task(self) -> Task:
+        """The task."""
+
+    @property
+    def configurations(self) -> Array:
+        """Configurations, a row for each control tick."""
+
+    @property
+    def hits(self) -> NDArray[np.int64]:
+        """Index of the row in which each goal was hit."""
+
+    def hand_path(self, hand: Hand) -> Array:
+        """Return the position of a hand in each row of ``configurations``."""
+
+
 def write_film(
-    movements: Sequence[tuple[str, Trajectory]],
+    movements: Sequence[tuple[str, Movement]],
     path: Path,
     *,
     width: int = 800,
@@ -108,7 +127,7 @@ def write_film(
 
 
 def stage(
-    movements: Sequence[tuple[str, Trajectory]], width: int
+    movements: Sequence[tuple[str, Movement]], width: int
 ) -> tuple[Figure, Callable[[int], list[Any]]]:
     """Return a figure with a panel for each movement, and a function that updates it.
 
@@ -145,7 +164,7 @@ def stage(
     return figure, show
 
 
-def _scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
+def _scene(axes: Axes, movement: Movement, colour: str) -> Callable[[int], None]:
     """Draw the goals, the robot, the paths of the hands and a counter of ticks.
 
     Return a function whose argument is the index of a row of the movement's configurations. The
