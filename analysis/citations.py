@@ -74,7 +74,7 @@ def bibliography(
     made_with = environment or {}
     note = f"Version {made_with.get('coartic') or __version__}"
     if commit := made_with.get("commit"):
-        note += f", commit {commit['id']}{' with changes' * commit['dirty']}"
+        note += f", commit {commit['id']}{' with changes' if commit['dirty'] else ''}"
     if any(worlds):
         note += f"; runs in {listed(map(world_title, worlds))}"
     software = _misc(

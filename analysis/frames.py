@@ -267,7 +267,7 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     """
     _refuse_worlds(frame)
     existing = [*getattr(frame, "columns", ())]
-    numbers = (*SCORES, *[ZERO] * (ZERO in existing), *more)
+    numbers = (*SCORES, *([ZERO] if ZERO in existing else []), *more)
     others = [name for name in ("setting", *_SOURCES) if name in existing]
     columns = _with_gaps(checked(frame, names=("method", "task"), numbers=numbers, others=others))
     number, tasks = pd.factorize(columns.task)
@@ -590,10 +590,13 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         failed = of_tasks.gap.isna()
         solved = of_tasks[~of_tasks.task.isin(of_tasks.task[failed])]
         reasons = [
-            f"{of_tasks.task.nunique()} of {pluralize(tasks, 'task')}"
-            * (of_tasks.task.nunique() < tasks),
-            f"{failed.sum()} of {pluralize(len(of_tasks), 'run')} failed" * bool(failed.any()),
-            "no best known reward" * (not tasks),
+            (
+                f"{of_tasks.task.nunique()} of {pluralize(tasks, 'task')}"
+                if of_tasks.task.nunique() < tasks
+                else ""
+            ),
+            (f"{failed.sum()} of {pluralize(len(of_tasks), 'run')} failed" if failed.any() else ""),
+            ("no best known reward" if not tasks else ""),
         ]
         why = "; ".join(filter(None, reasons))
         by_task = [part for _, part in solved.groupby("task").gap]

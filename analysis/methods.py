@@ -232,9 +232,9 @@ def methods_of(
     shorts = Counter(title_of(info, short=True) for info in declared.values())
     for label, of_method in by_label.items():
         method_id, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
-        named = f" ({describe_setting(setting)})" * bool(setting)
+        named = f" ({describe_setting(setting)})" if setting else ""
         if label in varied.index:
-            default_note = f", {default_name(method_id)}" * (not setting)
+            default_note = f", {default_name(method_id)}" if not setting else ""
             values = dict(zip(varied.columns, varied.loc[label], strict=True))
             named = f" ({describe_values(values)}{default_note})"
         info = declared[method_id]
@@ -248,8 +248,10 @@ def methods_of(
             "method_id": method_id,
             "condition": CONDITION_OF.get(method_id, ""),
             "setting": setting,
-            "title": title_of(called) + named + MARK * (method_id in marked),
-            "short_title": title_of(briefly, short=True) + named + MARK * (method_id in marked),
+            "title": title_of(called) + named + (MARK if method_id in marked else ""),
+            "short_title": title_of(briefly, short=True)
+            + named
+            + (MARK if method_id in marked else ""),
             "algorithm": one_line(facts.algorithm or (known.title if known else label)),
             "is_learner": method_id in LEARNERS,
             "is_search": method_id in SEARCHES,

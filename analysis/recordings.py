@@ -322,7 +322,7 @@ def _refuse(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str, sou
         shown = f"{value:g}" if isinstance(value, float) else brief_value(value)
         if pd.isna(value) or value == "":
             shown, needed = "empty", f"{needed}; leave out the rows of missing hits"
-        more = f" ({len(rows)} such rows)" * (len(rows) > 1)
+        more = f" ({len(rows)} such rows)" if len(rows) > 1 else ""
         row = f"{source}, data row {frame.index[rows[0]]}"
         raise CoarticError(f"{row}: {column} is {shown}; it must be {needed}{more}")
 

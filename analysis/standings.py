@@ -186,8 +186,8 @@ def standings(study: Study) -> pd.DataFrame:
         ends = dict.fromkeys([made.min(), made.max()])
         failed = int(of_method.failed_executions.sum())
         note = [
-            f"made {' to '.join(map(number, ends))} of {number(due)} trials" * bool(is_told),
-            f"{pluralize(failed, 'execution')} failed" * bool(failed),
+            (f"made {' to '.join(map(number, ends))} of {number(due)} trials" if is_told else ""),
+            (f"{pluralize(failed, 'execution')} failed" if failed else ""),
         ]
         notes.append("; ".join(filter(None, note)))
     rows = rows.assign(why=reasons, note=notes)

@@ -263,7 +263,7 @@ class TrajectoryProblem:
                     chosen = right if hand == "right" else 1 - right
                     jerks = _hand_jerks(robot, hand, q0, steps, durations, rates)
                     objective += casadi.dot(chosen, jerks)
-        self._lower = np.array([-np.inf] * len(limits) + [0.0] * bool(order))
+        self._lower = np.array([-np.inf] * len(limits) + ([0.0] if order else []))
         self._upper = np.zeros(len(self._lower))
         if order:
             limits.append(casadi.sum1(durations) - goals)

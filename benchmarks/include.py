@@ -289,7 +289,9 @@ def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:
         name, method = cell.task.name, cell.method
         agree(part_name, f"task {name!r}", f"definition {hash_of(cell.definition)[:8]}")
         kind = "version" if method.is_ours else "code"
-        hint = ": leave it out of one of them" + ", or give it another name" * (not method.is_ours)
+        hint = ": leave it out of one of them" + (
+            ", or give it another name" if not method.is_ours else ""
+        )
         agree(part_name, f"method {method.name!r}", f"{kind} {method.code}", hint)
         cell_named = f"{cell.label} on {name}"
         agree(part_name, f"the list of parameters of {cell_named}", sorted(cell.parameters))

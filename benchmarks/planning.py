@@ -213,7 +213,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
         words = (
             f"task {name!r} is not in suite {suite.name!r}: choose a suite that has it"
             if name in builtin_tasks()
-            else f"{unknown('task', name, tasks)}{hint * ('/' in name)}"
+            else f"{unknown('task', name, tasks)}{hint if '/' in name else ''}"
             for name in wrong
         )
         raise CoarticError("\n".join(words))

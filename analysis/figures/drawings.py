@@ -140,17 +140,20 @@ def _draw_parameters(study: Study) -> Parts | None:
         for row in rows.to_dict("records")
     )
     has_thin = not is_alone and bool(rows.at_best.notna().any())
-    over = ["the values of the other parameters"] * (not is_alone) + ["runs"]
-    over += ["tasks"] * (len(tasks) > 1)
+    over = (["the values of the other parameters"] if not is_alone else []) + ["runs"]
+    over += ["tasks"] if len(tasks) > 1 else []
     more = (
         f", by the values that vary. Points: means over {listed(over)}"
-        + f", with their {style.COVERAGE} bootstrap intervals over runs"
-        * bool(rows.gap_low.notna().any())
+        + (
+            f", with their {style.COVERAGE} bootstrap intervals over runs"
+            if rows.gap_low.notna().any()
+            else ""
+        )
         + ". n = {n} runs of a value."
-        + " Dashed: the gap at the best setting of the other parameters." * has_thin
-        + " Thin: the gap on each task." * (is_alone and 1 < len(tasks) <= 8)
-        + f" Small points: runs, if there are fewer than {MIN_VALUES}." * is_few
-        + " A circle marks the default." * bool((rows.default != "").any())
+        + (" Dashed: the gap at the best setting of the other parameters." if has_thin else "")
+        + (" Thin: the gap on each task." if is_alone and 1 < len(tasks) <= 8 else "")
+        + (f" Small points: runs, if there are fewer than {MIN_VALUES}." if is_few else "")
+        + (" A circle marks the default." if (rows.default != "").any() else "")
     )
     return drawing, rows, f"{alt}.", more
 
@@ -269,14 +272,16 @@ def _draw_gaps(study: Study) -> Parts | None:
     where = "" if len(tasks) > 1 else marked(study.tasks[tasks[0]]) + (":\n" if narrow else ": ")
     axes.set_xlabel(f"{where}gap to the {to} (%)")
     alt = f"Gap to the {to} by method: {spoken(study, shown, '{title} {gap:.1f} %')}."
-    bold = ["the paper's learner"] * any(rows.is_learner)
-    bold += ["methods from files (larger marks)"] * (not all(rows.built_in))
+    bold = ["the paper's learner"] if any(rows.is_learner) else []
+    bold += ["methods from files (larger marks)"] if not all(rows.built_in) else []
     more = f": less is better. With its {style.COVERAGE} bootstrap interval over runs."
-    more += " Means over all tasks." * (len(tasks) > 1)
-    more += " Grey lines: the gap on each task." * bool(on_tasks)
-    more += " The axis is logarithmic from 0.1 % on." * is_log
-    more += " Methods that are run once have no interval." * (not all(rows.stochastic))
-    more += f" Small points: runs, if there are fewer than {MIN_VALUES}." * any(few.values())
+    more += " Means over all tasks." if len(tasks) > 1 else ""
+    more += " Grey lines: the gap on each task." if on_tasks else ""
+    more += " The axis is logarithmic from 0.1 % on." if is_log else ""
+    more += " Methods that are run once have no interval." if not all(rows.stochastic) else ""
+    more += (
+        f" Small points: runs, if there are fewer than {MIN_VALUES}." if any(few.values()) else ""
+    )
     return drawing, rows, alt, more + (f" Bold: {listed(bold)}." if bold else "")
 
 
@@ -408,8 +413,10 @@ def draw_postures(study: Study) -> Parts | None:
         f"Posture difference: {'; '.join(differences)}. The distance of the hands is "
         f"{np.linalg.norm(hands[0] - hands[1]):.2f}."
     )
-    compared = " Compared with all runs of random search with as many trials." * (
-        chance is not None
+    compared = (
+        " Compared with all runs of random search with as many trials."
+        if chance is not None
+        else ""
     )
     return drawing, pd.concat(parts, ignore_index=True), alt, compared
 
@@ -466,7 +473,7 @@ def draw_shared_goal(study: Study) -> Parts | None:
         f"{shared.goal}: {words}."
     )
     more = f" Goal {shared.goal} of {marked(first)} and {marked(second)}."
-    more += " Dashed: random search." * bool(lines) + describe_kinds(
+    more += (" Dashed: random search." if lines else "") + describe_kinds(
         study, place.method, with_marks=True
     )
     if place.lean.isna().any():
@@ -631,7 +638,7 @@ def draw_runtimes(study: Study) -> Parts | None:
         )  # fmt: skip
     shares = spoken(study, ends, "{title} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
-    return drawing, data, alt, " Means over all tasks." * (len(target_ranges(study)) > 1)
+    return drawing, data, alt, (" Means over all tasks." if len(target_ranges(study)) > 1 else "")
 
 
 CURVES = (*LEARNERS, RANDOM_SEARCH, "hill-climbing", "cma-es/bandit")
@@ -854,7 +861,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
     means = spoken(study, rows_with_mean, "{title}, {family}: {mean:.1%}")
     words = f" {means}." if means else ""
     alt = f"Gaps of instances by method and family.{words}"
-    more = " Gaps above 100 % stand at the right end." * any(data.gap > 1)
+    more = " Gaps above 100 % stand at the right end." if any(data.gap > 1) else ""
     return drawing, data, alt, more + describe_kinds(study, order)
 
 
@@ -889,7 +896,7 @@ def draw_tasks(study: Study) -> Parts | None:
     names = ", ".join(task.name for task in shown)
     alt = f"The robot in its start configuration with the goals of the tasks {names}."
     are_papers = {task.name for task in shown} <= shipped_tasks().keys()
-    source = " After Figure 4 of Shah, Barto & Fagg (2013)." * are_papers
+    source = " After Figure 4 of Shah, Barto & Fagg (2013)." if are_papers else ""
     return picture_of_tasks(shown), pd.DataFrame(rows), alt, source
 
 
@@ -917,8 +924,10 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
             axes.plot(*left, color=style.GREY, alpha=0.5, linewidth=3.2, zorder=1.7)
         for circle in circle_goals(axes, task):
             circle.set_edgecolor(style.BLUE)
-        remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
-        remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)
+        remarks = (
+            [f"{' and '.join(task.reconstructed)} reconstructed"] if task.reconstructed else []
+        )
+        remarks += [f"base locked in {' and '.join(task.locked_base)}"] if task.locked_base else []
         fits = int(14 * drawing.get_figwidth() / columns)  # letters
         title = [*textwrap.wrap(task.label, fits), *textwrap.wrap("; ".join(remarks), fits)]
         axes.set_title("\n".join(title))

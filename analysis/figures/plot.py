@@ -138,7 +138,7 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
             for axes in drawing.axes:
                 texts += [axes.get_xlabel(), axes.get_title(), axes.get_title(loc="left")]
             has_dagger = any("†" in text for text in texts)
-            words = f"{caption}{more}{f' {RECONSTRUCTED}' * has_dagger}"
+            words = f"{caption}{more}{f' {RECONSTRUCTED}' if has_dagger else ''}"
             ends = (data.runs.min(), data.runs.max()) if "runs" in data else ()
             to = reference(study, study.optima)
             n = " to ".join(dict.fromkeys(map(number, ends)))
@@ -195,7 +195,7 @@ def describe_kinds(study: Study, labels: Iterable[str], *, with_marks: bool = Fa
     rows = study.methods.loc[[*labels]]
     kinds = {*rows.information[rows.built_in.astype(bool)]}
     words = [
-        f"{word}{f' {mark}s' * with_marks}: methods {kind}"
+        f"{word}{f' {mark}s' if with_marks else ''}: methods {kind}"
         for kind, (_, mark, word) in KINDS.items() if kind in kinds
     ]  # fmt: skip
     return f" {capital('; '.join(words))}." if len(words) > 1 else ""
@@ -214,8 +214,8 @@ def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -
         row = study.methods.loc[method]
         values = study.varied.loc[method].items()
         words = describe_values({str(name): value for name, value in values})
-        words += f", {default_name(str(row.method_id))}" * (
-            not row.setting
+        words += (
+            f", {default_name(str(row.method_id))}" if not row.setting else ""
         ) + MARK * row.title.endswith(MARK)
         return "\n".join(
             textwrap.wrap(words, _MAX_NAME_LENGTH // 2 if style.is_narrow() else longest)
@@ -388,7 +388,9 @@ def panels_for_page(plot: Plot) -> list[str]:
     for place, box in enumerate(boxes, 1):
         x, y = points * box.x0 - 1, height - points * box.y1 - 1
         view = f"{x:.1f} {y:.1f} {points * box.width + 2:.1f} {points * box.height + 2:.1f}"
-        label = html.escape(one_line(f"{plot.title}, part {place}. {plot.alt * (place == 1)}"))
+        label = html.escape(
+            one_line(f"{plot.title}, part {place}. {plot.alt if place == 1 else ''}")
+        )
         views.append(
             f'<svg viewBox="{view}" xmlns="http://www.w3.org/2000/svg" role="img" '
             f'aria-label="{label}"><use href="#{plot.id}-drawing"/></svg>'

@@ -248,7 +248,7 @@ def means(
         or an end of an interval is neither a finite number nor NaN.
     """
     ends = [f"{y}_low", f"{y}_high"] if f"{y}_low" in getattr(frame, "columns", ()) else []
-    checked(frame, numbers=[x, y, *ends], others=[by] * bool(by))
+    checked(frame, numbers=[x, y, *ends], others=([by] if by else []))
     frame = frame.reset_index(drop=True)
     groups = frame.groupby(by, sort=False) if by else [("", frame)]
     for number, (color, (name, rows)) in enumerate(

@@ -363,7 +363,7 @@ def finding(study: Study, section: Section) -> list[str]:
     """
     is_ranking = section.tables[0] is list_ranking
     if not section.sentence or not len(section.tables[0](study)):
-        return ["No method is ranked."] * is_ranking
+        return ["No method is ranked."] if is_ranking else []
     if is_ranking and varies_parameters(study):
         return [shown(line) for line in answer_on_parameters(study)]
     methods = study.methods
@@ -373,7 +373,7 @@ def finding(study: Study, section: Section) -> list[str]:
     def few(row: Mapping[str, Any]) -> str:
         """Return a remark if a stochastic method has too few runs for a test, otherwise ""."""
         labels = str(row["method"]), str(row["against"])
-        return TOO_FEW * has_few_runs(study, labels, solved_tasks(study, labels[1]))
+        return TOO_FEW if has_few_runs(study, labels, solved_tasks(study, labels[1])) else ""
 
     def named(table: Table) -> pd.DataFrame:
         all_rows = table(study)
@@ -422,7 +422,7 @@ def _beside(row: Mapping[str, Any], is_first: bool) -> str:
     sign = 1 if row["difference"] > 0 else -1
     ends = [sign * float(row[f"difference_{end}"]) for end in ("low", "high")][::sign]
     distance = dict(zip(("d", "d_low", "d_high"), [abs(row["difference"]), *ends], strict=True))
-    words = f"{interval(distance, 'd', scale=100)}{' points' * is_first}"
+    words = f"{interval(distance, 'd', scale=100)}{' points' if is_first else ''}"
     return f"{words} {'ahead of' if sign > 0 else 'behind'} {other}"
 
 
@@ -534,7 +534,7 @@ def failures_in(runs: pd.DataFrame) -> dict[str, Any]:
     return {
         "runs": len(runs),
         "failed": len(failed),
-        "reasons": commonest(reasons) + [f"{others} for other reasons"] * bool(others),
+        "reasons": commonest(reasons) + ([f"{others} for other reasons"] if others else []),
     }
 
 

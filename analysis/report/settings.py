@@ -80,7 +80,7 @@ def _best_setting(study: Study, rows: pd.DataFrame) -> str:
             with_gaps.append(f"and {len(more)} more (up to {_gap_of(max(rows.gap[more]))})")
         sentences.append(f"It cannot be told apart from {'; '.join(with_gaps)}.")
     elif unlike:
-        few = TOO_FEW * has_few_runs(study, [best, *named], ranked_tasks(study))
+        few = TOO_FEW if has_few_runs(study, [best, *named], ranked_tasks(study)) else ""
         sentences.append(f"The next is {with_gaps[0]}{few}.")
     for label in {*rows.index[rows.setting == ""]} - {best, *named}:
         subject = f"The {default_name(base).removeprefix('the ')} setting"
@@ -128,8 +128,8 @@ def _effect_of(study: Study, parameter: str) -> str:
     alike, is_tested = rows.value[rows.p_holm >= LEVEL].tolist(), rows.p_holm.notna().any()
     if len(alike) == len(rows) - 1:
         shown = f"{subject} no difference is shown{on_average} (gaps are {apart} apart"
-        return f"{shown}{f', and {at_best}' * bool(at_best)})."
-    change = f"the gap by {apart}{on_average}{f', and by {at_best}' * bool(at_best)}"
+        return f"{shown}{f', and {at_best}' if at_best else ''})."
+    change = f"the gap by {apart}{on_average}{f', and by {at_best}' if at_best else ''}"
     labels = [label for value in compared for label in value.labels]
     few = not is_tested and has_few_runs(study, labels, ranked_tasks(study))
     least = f"it is smallest at {rows.value.iloc[int(rows.gap.argmin())]}"
@@ -151,7 +151,7 @@ def _settings_behind(study: Study, rows: pd.DataFrame) -> str:
     hands = "its best hands"
     if any(not len(study.sequences(task)) for task in ranked_tasks(study)):
         hands = "its best hands, or the initial ones of tasks with too many sequences,"
-    who = f"{count} of {len(rows)} settings stay{'s' * (count == 1)}"
+    who = f"{count} of {len(rows)} settings stay{'s' if count == 1 else ''}"
     who = f"All {count} settings stay" if count == len(rows) else who
     trials = f" in {number(budget)} trials" if budget else ""
     open_ones = int((behind.share_high >= 0).sum())

@@ -124,7 +124,9 @@ def _columns_by_part(shared: TwoContexts) -> Row:
 def _columns_of(signature: Signature) -> str:
     """Return the lines that define the columns of a signature, for :func:`table`."""
     name, decimals = signature.column, signature.decimals
-    tex, of_control = ("tex" * (part in signature.in_latex) for part in ("value", "control"))
+    tex, of_control = (
+        ("tex" if part in signature.in_latex else "") for part in ("value", "control")
+    )
     return f"""
     {name}[]            | {signature.heading} | {decimals} | {tex}
     {name}_control      | random search | {decimals} | {of_control}

@@ -227,7 +227,7 @@ def caption_of(table: Table, study: Study) -> str:
     """
     caption = table.caption.replace("{tasks}", pluralize(len(ranked_tasks(study)), "task"))
     caption = caption.replace("{reference}", reference(study, study.optima))
-    return caption + f" ({world_title(study.world)})" * bool(study.world)
+    return caption + (f" ({world_title(study.world)})" if study.world else "")
 
 
 def csv_of_worlds(frames: Mapping[str, pd.DataFrame]) -> str:
@@ -325,7 +325,7 @@ def shown_columns(
                 shown[name] = ShownColumn(heading, texts, is_number=False)
                 continue
             of_number = [name, f"{name}_low", f"{name}_high"] if "[" in column.ending else [name]
-            of_number += [f"{name}_sd"] * (column.ending == "±")
+            of_number += [f"{name}_sd"] if column.ending == "±" else []
             rows = frame[of_number].astype(float).to_numpy() * (100.0 if "(%)" in heading else 1.0)
             if column.ending == "±":
                 heading += " ± SD"

@@ -89,7 +89,7 @@ def report(
             study, out, for_paper=for_paper, width=width, own=section, watch=display.show
         )
     counts = Counter(Path(name).suffix for name in files)
-    figures = f" and {pluralize(counts['.svg'], 'figure')}" * for_paper
+    figures = f" and {pluralize(counts['.svg'], 'figure')}" if for_paper else ""
     say(f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
         f"{pluralize(counts['.csv'], 'table')}{figures}.")  # fmt: skip
     for part, reason in failures.items():
@@ -112,9 +112,9 @@ def say_ranking(study: Study, folder: Path) -> None:
 
     has_headings = [*study.worlds] != [""]
     for world, of_world in study.worlds.items():
-        say(*[f"{capital(world_title(world))}:"] * has_headings)
+        say(*([f"{capital(world_title(world))}:"] if has_headings else []))
         _say_ranking_of_world(of_world)
-        say(*[""] * has_headings)
+        say(*([""] if has_headings else []))
     page = folder / "report" / "report.html"
     say_pairs([("Report", f"`coartic report {quote(str(folder))}` writes {page}")])
 
@@ -144,13 +144,13 @@ def _say_ranking_of_world(study: Study) -> None:
     names = [
         row.title
         if row.built_in
-        else "> " * has_others
+        else ("> " if has_others else "")
         + (row.title if row.title.startswith(row.method_id) else f"{row.method_id}: {row.title}")
         for _, row in methods.iterrows()
     ]
     methods = methods.assign(name=names)
     ranked, unranked = methods[methods.why == ""], methods[methods.why != ""]
-    headings = ["method", "gap (%)", "share (%)", "runs", *["note"] * any(ranked.note)]
+    headings = ["method", "gap (%)", "share (%)", "runs", *(["note"] if any(ranked.note) else [])]
     cells = [
         [row["name"], interval(row, "gap", scale=100), interval(row, "share", 0, 100),
          number(row["runs"]), row["note"]][: len(headings)]
@@ -167,7 +167,7 @@ def _say_ranking_of_world(study: Study) -> None:
     ]
     if len(ranked):
         known = f"gaps are to the {reference(study, ranked_tasks(study))}"
-        known += " in this world" * bool(study.world)
+        known += " in this world" if study.world else ""
         pairs.append(("Reference", known))
     if notes["own"]:
         known = f"for {listed(notes['own'])} only the best reward of this folder is known"
@@ -243,7 +243,11 @@ def verify(
         say(
             f"{pluralize(report.runs, 'run')} checked, "
             f"{pluralize(report.movements, 'movement')} executed.",
-            *[f"{pluralize(executed, 'solution')} executed with motor noise."] * bool(executed),
+            *(
+                [f"{pluralize(executed, 'solution')} executed with motor noise."]
+                if executed
+                else []
+            ),
             *(wrong or ["Nothing differs."]),
             *report.unfinished,
         )
@@ -319,7 +323,7 @@ def _describe_run(run: Row, code: str) -> None:
         result = f"reward {number(run['reward'])}, hands {run['hands']}"
     elif run["mean_ticks"] is not None:
         result = f"mean ticks {number(run['mean_ticks'])}, hands {run['hands']}"
-    world = [("World", cell.world)] * bool(cell.world)
+    world = [("World", cell.world)] if cell.world else []
     say_pairs(
         [
             (
@@ -421,7 +425,7 @@ def draw(
         if tasks[0] in builtin_tasks() and not folder.exists():
             raise CoarticError(f"--run needs a results folder; {folder} is a task")
         return _film(folder, run, film, initial, width or 800, replace)
-    without = ["--initial"] * initial + ["--width"] * (width is not None)
+    without = (["--initial"] if initial else []) + (["--width"] if width is not None else [])
     if without:
         has = "have" if without[1:] else "has"
         raise CoarticError(f"{' and '.join(without)} {has} no effect without --run")
@@ -503,7 +507,7 @@ def _film(
         stored = find_run(run_id, folder)
         movement = trajectory_of(stored)
         world = stored.cell.world
-        subject = movement.task.label + f", {world}" * bool(world)
+        subject = movement.task.label + (f", {world}" if world else "")
         title = f"{subject}\n{title_of(stored.cell.method)}, run {stored['run']}"
         movements.append((title, movement))
     if initial:

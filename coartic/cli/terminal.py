@@ -196,7 +196,7 @@ class Display:
         finished = progress.present + progress.done
         if self._bar:
             self._bar.update(self._bar.task_ids[0], completed=finished, total=progress.total)
-        failed = f"{progress.failed} failed" * bool(progress.failed)
+        failed = f"{progress.failed} failed" if progress.failed else ""
         repeats = ""
         if progress.repeats:
             repeats = f"{pluralize(progress.repeats, 'run')} again, to see whether results repeat"

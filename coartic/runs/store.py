@@ -641,7 +641,7 @@ def _environment_row(content: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "id": hash_of(content)[:16],
         "content": json.dumps(content, ensure_ascii=False, sort_keys=True),
-        "commit": commit and commit["id"] + "+" * commit["dirty"],
+        "commit": commit and commit["id"] + ("+" if commit["dirty"] else ""),
         "packages": hash_of([content.get("python"), content.get("packages")])[:8],
     }
 

@@ -376,8 +376,8 @@ def instance_of(family: Family, address: Address) -> Task:
     short = name.rpartition("/")[2]
     source = f"drawn: family {family.name}, instance {short}"
     chosen = ["goals", "start", "initial_hands"]
-    chosen += ["locked_base"] * bool(task.locked_base)
-    chosen += ["robot"] * (task.robot != Robot())
+    chosen += ["locked_base"] if task.locked_base else []
+    chosen += ["robot"] if task.robot != Robot() else []
     base = {0: "a free base", 1: "the base on a rail", 2: "the base locked"}[len(task.locked_base)]
     links = len(task.robot.left_links)
     content = task.model_dump() | {

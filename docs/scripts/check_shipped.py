@@ -181,12 +181,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     found = list(differences(rows))
     old = runs[~runs.is_current]
     print(f"{rows.is_current.sum()} shipped runs performed again: {len(found) or 'none'} differ.")
-    print(*(f"- {sentence}" for sentence in found), sep="\n", end="\n" * bool(found))
+    print(*(f"- {sentence}" for sentence in found), sep="\n", end=("\n" if found else ""))
     print(f"Runs by earlier versions, to be made again: {len(old) or 'none'} of {len(runs)}.")
     for (suite, method, version), rows_of in old.groupby(["suite", "method", "code"]):
         print(f"- {suite}: {len(rows_of)} of {method} {version}; here {built_in()[method].code}")
     missing = [*missing_entries(runs)] if options.release else []
-    print(*(f"- {sentence}" for sentence in missing), sep="\n", end="\n" * bool(missing))
+    print(*(f"- {sentence}" for sentence in missing), sep="\n", end=("\n" if missing else ""))
     return int(bool(found) or bool(missing) or (options.release and len(old) > 0))
 
 

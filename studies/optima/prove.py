@@ -99,7 +99,10 @@ def polished(task, chains, still):
 
 def describe_row(row):
     """Return a sentence about a row of the log."""
-    is_proven, more = row["bound"] == row["reward"], ", a better solution" * ("solution" in row)
+    is_proven, more = (
+        row["bound"] == row["reward"],
+        (", a better solution" if "solution" in row else ""),
+    )
     proof = "proven optimal" if is_proven else f"no solution exceeds {row['bound']}"
     words = "{task} (base {base}, other arm {other_arm}): {reward}, {proof}, {nodes} programmes, "
     return f"{words}{{seconds}} s{more}".format(**row, proof=proof)

@@ -84,7 +84,7 @@ def all_higher(comparisons, shown=()):
 
 def said(published):
     """Write a published mean, followed by "(derived)" if it is computed from other numbers."""
-    return f"{number(published.mean)}{' (derived)' * published.derived}"
+    return f"{number(published.mean)}{' (derived)' if published.derived else ''}"
 
 
 def difference_test(first, other, alternative):

@@ -136,7 +136,7 @@ class Reader:
         self.runs(task, label)
         values = self.study.signature(name, task, label, replay=replay).to_numpy(np.float64)
         values = values[np.isfinite(values)]
-        return self.shown(name, task, label, values, "in noiseless replays, " * replay)
+        return self.shown(name, task, label, values, ("in noiseless replays, " if replay else ""))
 
     def beyond_random_search(self, name, task, label):
         """Return comparisons of a method's signature with random search, by hand sequence.

@@ -54,7 +54,7 @@ def compare_rewards(study):
             if is_compared:
                 difference = difference_to_published(rewards, *summary[:3])
             row = {
-                "task": study.tasks[task].label + " †" * bool(study.tasks[task].reconstructed),
+                "task": study.tasks[task].label + (" †" if study.tasks[task].reconstructed else ""),
                 "condition": condition,
                 "hands": name,
                 "published": summary.mean,
@@ -141,7 +141,7 @@ def draw_rewards(rewards):
     figure, (axes,) = figures.panels((1, 1), (figures.TWO, 0.85 + 0.185 * len(shown)))
     names = []
     for y, row in zip(range(0, -len(shown), -1), shown.itertuples(), strict=True):
-        name = f"{row.task}, {row.condition}{'*' * bool(row.pooled)}"
+        name = f"{row.task}, {row.condition}{'*' if row.pooled else ''}"
         if isinstance(row.hands, str):
             published = "" if math.isnan(row.published_runs) else f"; {row.published_runs:.0f}"
             name = f"↳ {row.hands} ({row.runs}/{row.of_runs}{published})"
