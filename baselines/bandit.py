@@ -12,8 +12,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 
-import numpy as np
-
 from coartic.baselines.uninformed import Attempts, SequenceParameters
 from coartic.method import Result, Session
 from coartic.method.optimisers import sequences_of
@@ -203,6 +201,5 @@ def recommend(searches: Iterable[Search], attempts: Attempts) -> tuple[Movement,
     best = min(
         searches, key=lambda each: (each.answer[0], each.hand_sequence != attempts.hand_sequence)
     )
-    targets = np.full(attempts.explored.shape, np.nan)
-    targets[attempts.explored] = best.answer[1]
+    targets = attempts.targets_of(best.answer[1][None])[0]
     return movements_of(best.hand_sequence, targets)

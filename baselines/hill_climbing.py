@@ -30,7 +30,8 @@ has the same bias.
 from __future__ import annotations
 
 import math
-from collections import Counter, defaultdict
+from collections import Counter
+from collections.abc import Iterator
 from itertools import pairwise
 from operator import eq
 from typing import Annotated, Literal
@@ -38,10 +39,11 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from coartic.baselines.uninformed import Attempts, SequenceParameters
+from coartic.baselines.uninformed import Attempts, Draw, SequenceParameters
 from coartic.method import Facts, Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.motion.solution import Movement, movements_of
+from coartic.motion.trials import Trials
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
 
@@ -49,7 +51,6 @@ _EPSILON = 0.2  # probability of a random hand, for each goal
 _GROWTH = 1.5  # factor of the one-fifth rule
 _SHRINKAGE = 1.0 / math.sqrt(math.sqrt(_GROWTH))  # square roots round alike on all machines
 _MAX_SPREAD = 0.3  # under the one-fifth rule, in length units and rad
-_MAX_DRAWN_TRIALS = 128  # largest number of trials that are drawn ahead
 
 
 class HillClimbingParameters(SequenceParameters):
@@ -77,6 +78,98 @@ class HillClimbingParameters(SequenceParameters):
     """Smallest standard deviation under the one-fifth rule, in length units and rad."""
 
 
+class _Hill:
+    """The centre of a hand sequence, and the spread of the trials around it."""
+
+    def __init__(self, spread: float) -> None:
+        self.centre: Array = np.empty(0)  # of the explored joints, shape (n,)
+        self.value = -math.inf
+        self.spread = spread
+        self.trials = self.good_trials = 0  # since the spread changed
+
+    def adapt(self, is_good: bool, parameters: HillClimbingParameters) -> None:
+        """Count a trial around the centre, and adapt the spread by the one-fifth rule."""
+        self.trials += 1
+        self.good_trials += is_good
+        if self.trials == parameters.window:
+            factor = _GROWTH if self.good_trials > parameters.window / 5 else _SHRINKAGE
+            self.spread = min(max(self.spread * factor, parameters.floor), _MAX_SPREAD)
+            self.trials = self.good_trials = 0
+
+
+class _Climb:
+    """One run of hill climbing: what it knows, how it draws trials, what it learns from them."""
+
+    def __init__(self, session: Session, parameters: HillClimbingParameters) -> None:
+        self.parameters, self.rng = parameters, session.rng
+        self.given = parameters.told_hands(session)
+        self.initial_hands = session.find_initial_hands() if self.given is None else self.given
+        self.letters, self.unknown = letters_of(session.hands), "?" * session.goals_count
+        self.sequences = 1 if self.given else len(self.letters) ** session.goals_count
+        self.attempts = Attempts(session, parameters.trials)
+        self.goals = np.nonzero(self.attempts.explored)[0]  # of each explored joint
+        self.is_learned = parameters.spread == "learned"
+        self.hills: dict[str, _Hill] = {}  # by hand sequence
+        self.hopeless: set[str] = set()  # sequences that the corrective process does not complete
+
+    def draw_hands(self) -> str:
+        """Draw the hand sequence of a trial."""
+        if self.given is not None or not self.attempts.trials_made:
+            return self.initial_hands
+        letters, rng = self.letters, self.rng
+        while True:
+            hands = "".join(
+                letters[rng.integers(len(letters))]
+                if hand == "?" or rng.random() < _EPSILON
+                else hand
+                for hand in self.attempts.hand_sequence or self.unknown
+            )
+            if hands not in self.hopeless:
+                return hands
+
+    def draw_first(self, hands: str) -> Array:
+        """Draw the targets of the first trial of a hand sequence."""
+        values, best = np.full(len(self.goals), np.nan), self.attempts.hand_sequence
+        if self.parameters.begin == "best" and best:
+            pairs, of_best = ([*pairwise(f" {each}")] for each in (hands, best))
+            aimed = np.array([*map(eq, pairs, of_best)])[self.goals]
+            noise = self.rng.normal(0.0, self.parameters.sigma, aimed.sum())
+            values[aimed] = self.hills[best].centre[aimed] + noise
+        return values
+
+    def draws(self) -> Iterator[Draw]:
+        """Draw trials until the first of a hand sequence, or the last of a window."""
+        counts = Counter[str]()
+        while (hands := self.draw_hands()) in self.hills:
+            hill = self.hills[hands]
+            values = hill.centre + self.rng.normal(0.0, hill.spread, len(self.goals))
+            yield Draw(hands, values, hill.value)
+            counts[hands] += 1
+            if self.is_learned and hill.trials + counts[hands] == self.parameters.window:
+                return
+        yield Draw(hands, self.draw_first(hands), -math.inf)
+
+    def learn(self, drawn: list[Draw], trials: Trials) -> None:
+        """Adapt spreads, and move the centre if the last trial is better."""
+        if self.is_learned:
+            for draw, reward in zip(drawn, trials.rewards, strict=True):
+                if draw.hand_sequence in self.hills:
+                    is_good = bool(reward >= draw.threshold)
+                    self.hills[draw.hand_sequence].adapt(is_good, self.parameters)
+        hands, values, threshold = drawn[-1]
+        if trials.rewards[-1] > threshold:
+            hill = self.hills.setdefault(hands, _Hill(self.parameters.sigma))
+            hill.centre = trials.reached[-1, self.attempts.explored]
+            hill.value = float(trials.rewards[-1])
+        elif np.isnan(values).all():
+            self.hopeless.add(hands)
+
+    def recommend(self) -> tuple[Movement, ...]:
+        """Return movements to the centre of the hand sequence that the best trial used."""
+        hands = self.attempts.hand_sequence
+        return movements_of(hands, self.attempts.targets_of(self.hills[hands].centre[None])[0])
+
+
 class HillClimbing(Method):
     """Hill climbing for each hand sequence, from its best trial so far."""
 
@@ -100,115 +193,12 @@ class HillClimbing(Method):
         Raises MethodError if no trial hits every goal, NotApplicableError if no initial hands are
         found, and ValueError if parameter ``sequence`` does not fit the task.
         """
-        parameters: HillClimbingParameters = self.parameters
-        is_learned, window = parameters.spread == "learned", parameters.window
-        given, rng = parameters.told_hands(session), session.rng
-        initial_hands = session.find_initial_hands() if given is None else given
-        letters = letters_of(session.hands)
-        attempts = Attempts(session, parameters.trials)
-        sequences, ahead = 1 if given else len(letters) ** session.goals_count, 1
-        explored, dim = attempts.explored, attempts.explored.sum()
-        centres: dict[str, Array] = {}  # by hand sequence, (G, dof); NaN for joints not explored
-        rewards: dict[str, float] = {}  # of the centre, by hand sequence
-        spreads = defaultdict[str, float](lambda: parameters.sigma)  # by hand sequence
-        since, good = Counter[str](), Counter[str]()  # trials since a spread changed; good ones
-        hopeless: set[str] = set()  # sequences that the corrective process does not complete
-
-        def draw(best: str) -> str:
-            """Draw a hand sequence with which the corrective process has not failed.
-
-            With parameter ``sequence`` the result is that sequence. Otherwise all hands are random
-            if ``best``, the hand sequence of the best trial, is empty. If it is not, the hands are
-            those of ``best``, but at each goal, with probability 0.2, the hand is replaced by a
-            random hand.
-            """
-            if given is not None:
-                return given
-            while True:
-                chosen = list(best or letters[0] * session.goals_count)
-                for goal in range(len(chosen)):
-                    if not best or rng.random() < _EPSILON:
-                        chosen[goal] = letters[rng.integers(len(letters))]
-                if (hand_sequence := "".join(chosen)) not in hopeless:
-                    return hand_sequence
-
-        def adapt(hand_sequence: str, is_good: bool) -> None:
-            """Count a trial with a hand sequence, and adapt the sequence's spread.
-
-            The spread follows the one-fifth rule. ``is_good`` is True if the reward of the trial is
-            at least the value of the centre around which it was drawn.
-            """
-            since[hand_sequence] += 1
-            good[hand_sequence] += is_good
-            if since[hand_sequence] == window:
-                factor = _GROWTH if good[hand_sequence] > window / 5 else _SHRINKAGE
-                wanted = max(spreads[hand_sequence] * factor, parameters.floor)
-                spreads[hand_sequence] = min(wanted, _MAX_SPREAD)
-                since[hand_sequence] = good[hand_sequence] = 0
-
-        def begin(hand_sequence: str) -> Array:
-            """Return the targets of the first trial of a hand sequence, shape ``(G, dof)``."""
-            targets = np.full(explored.shape, np.nan)
-            if parameters.begin == "best" and attempts.hand_sequence:
-                states, of_best = (
-                    [*pairwise(f" {each}")] for each in (hand_sequence, attempts.hand_sequence)
-                )
-                shared = np.array([*map(eq, states, of_best)])
-                aimed = shared[:, None] & explored
-                noise = parameters.sigma * rng.standard_normal(aimed.sum())
-                targets[aimed] = centres[attempts.hand_sequence][aimed] + noise
-            return targets
-
+        climb = _Climb(session, self.parameters)
+        attempts = climb.attempts
         with session.solving():
-            while attempts.left > 0 and len(hopeless) < sequences:
-                # Draws do not depend on rewards until a centre moves, which is rare, or a spread
-                # changes. So trials are drawn ahead and made side by side, up to the end of a
-                # window. If a trial moves a centre, the later draws are discarded: the generator is
-                # set back, and makes the draws up to this trial again.
-                drawn, noise = list[str](), list[Array]()
-                state, best = rng.bit_generator.state, attempts.hand_sequence
-                while len(drawn) < min(ahead, attempts.left):
-                    hand_sequence = draw(best) if attempts.trials_made else initial_hands
-                    if hand_sequence not in centres:
-                        break
-                    drawn.append(hand_sequence)
-                    noise.append(rng.standard_normal(dim))
-                    if is_learned and since[hand_sequence] + drawn.count(hand_sequence) == window:
-                        break
-                if drawn:
-                    thresholds = np.array([rewards[hand_sequence] for hand_sequence in drawn])
-                    targets = np.array([centres[hand_sequence] for hand_sequence in drawn])
-                    scales = np.array([spreads[hand_sequence] for hand_sequence in drawn])
-                    targets[:, explored] += scales[:, None] * np.array(noise)
-                    attempt = attempts.run_targets(drawn, targets, until=thresholds)
-                    tried = len(attempt.rewards)
-                    if tried < len(drawn) or hand_sequence not in centres:
-                        rng.bit_generator.state = state
-                        for _ in range(tried):
-                            draw(best)
-                            rng.standard_normal(dim)
-                    hand_sequence, ahead = drawn[tried - 1], min(2 * ahead, _MAX_DRAWN_TRIALS)
-                    if attempt.rewards[-1] > rewards[hand_sequence]:
-                        ahead = tried
-                    if is_learned:
-                        for each, is_good in zip(
-                            drawn[:tried], attempt.rewards >= thresholds[:tried], strict=True
-                        ):
-                            adapt(each, bool(is_good))
-                else:
-                    rewards[hand_sequence] = -np.inf
-                    targets = begin(hand_sequence)
-                    attempt = attempts.run_targets([hand_sequence], targets[None])
-                    if attempt.rewards[-1] == -np.inf and np.isnan(targets).all():
-                        hopeless.add(hand_sequence)
-                if attempt.rewards[-1] > rewards[hand_sequence]:
-                    centres[hand_sequence] = np.where(explored, attempt.reached[-1], np.nan)
-                    rewards[hand_sequence] = float(attempt.rewards[-1])
-
-        def centre() -> tuple[Movement, ...]:
-            return movements_of(attempts.hand_sequence, centres[attempts.hand_sequence])
-
-        return attempts.result(centre, sequences=len(centres))
+            while attempts.left > 0 and len(climb.hopeless) < climb.sequences:
+                climb.learn(*attempts.run_ahead(climb.draws))
+        return attempts.result(climb.recommend, sequences=len(climb.hills))
 
 
 METHODS: tuple[type[Method], ...] = (HillClimbing,)

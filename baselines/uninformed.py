@@ -10,8 +10,9 @@ In this module *joints* are all entries of a configuration: base coordinates and
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Annotated, Any
+from collections.abc import Callable, Iterator
+from itertools import islice
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -21,6 +22,8 @@ from coartic.method.optimisers import explored_joints
 from coartic.motion.solution import Movement, movements_of
 from coartic.motion.trials import Trials
 from coartic.robot import Array
+
+_MAX_AHEAD = 128  # largest number of trials that are drawn ahead
 
 
 class UninformedParameters(Parameters):
@@ -50,6 +53,18 @@ class SequenceParameters(UninformedParameters):
         return session.find_initial_hands() if self.sequence == "given" else self.sequence
 
 
+class Draw(NamedTuple):
+    """A trial that is drawn, but not yet made."""
+
+    hand_sequence: str
+    """Hand sequence, such as ``"RRLR"``."""
+    values: Array
+    """Targets of the explored joints, goal by goal, shape ``(n,)``, in length units and rad; NaN
+    for joints that do not move."""
+    threshold: float
+    """The trial is *better* if its reward exceeds this threshold (in ticks)."""
+
+
 class Attempts:
     """Make the physical trials of one run, and remember the best trial.
 
@@ -73,6 +88,7 @@ class Attempts:
         left = session.trials_left
         self.left = trials if left is None else min(trials, left)
         """Number of trials left."""
+        self._ahead = 1
         self.trials_made = 0
         """Number of trials made."""
         self.reward = -math.inf
@@ -133,13 +149,63 @@ class Attempts:
         BudgetError
             No trial of the session is left.
         """
+        return self.run_targets(hand_sequence, self.targets_of(values))
+
+    def targets_of(self, values: Array) -> Array:
+        """Convert targets of the explored joints, shape ``(N, n)``, to shape ``(N, G, dof)``.
+
+        Both are in length units and rad. The targets of other joints are NaN.
+        """
         targets = np.full((len(values), *self.explored.shape), np.nan)
         targets[:, self.explored] = values
-        return self.run_targets(hand_sequence, targets)
+        return targets
 
-    def run_targets(
-        self, hand_sequences: str | list[str], targets: Array, until: Array | None = None
-    ) -> Trials:
+    def run_ahead(self, draws: Callable[[], Iterator[Draw]]) -> tuple[list[Draw], Trials]:
+        """Draw trials ahead, make them, and go back to the first that is better.
+
+        The trials are those of a loop that draws a trial and makes it, until one is better than its
+        threshold. Many trials that are made at once take much less CPU time than trials in a loop,
+        and few trials are better. So up to 128 trials are drawn, as if none of them were better. If
+        one is, the trials after it are not counted, and the session's generator is set to its state
+        after the draw of this trial.
+
+        Parameters
+        ----------
+        draws : callable
+            Function whose iterator draws trials with the session's generator. It yields at least
+            one trial, and ends after a trial if the next draw depends on the reward of this trial
+            even though it is not better. The function is called again to go back, and must then
+            yield the same trials from the same state of the generator.
+
+        Returns
+        -------
+        list of Draw
+            The trials that were made and counted, at least one. All but the last are not better.
+        Trials
+            Results of these trials, in order.
+
+        Raises
+        ------
+        BudgetError
+            No trial of the session is left.
+        """
+        bits = self._session.rng.bit_generator
+        before = bits.state
+        drawn = [*islice(draws(), min(self._ahead, self.left))]
+        hand_sequences = [draw.hand_sequence for draw in drawn]
+        targets = self.targets_of(np.array([draw.values for draw in drawn]))
+        thresholds = np.array([draw.threshold for draw in drawn])
+        trials = self._session.trials(hand_sequences, targets, until=thresholds)
+        counted = len(trials.rewards)
+        if counted == len(drawn):
+            self._ahead = min(2 * self._ahead, _MAX_AHEAD)
+        else:
+            self._ahead, bits.state = counted, before
+            drawn = [*islice(draws(), counted)]
+        self._remember(hand_sequences, targets, trials)
+        return drawn, trials
+
+    def run_targets(self, hand_sequences: str | list[str], targets: Array) -> Trials:
         """Make trials with targets, and remember the best trial so far.
 
         Parameters
@@ -148,22 +214,24 @@ class Attempts:
             One hand sequence for all trials, or a list with a hand sequence for each trial.
         targets : ndarray, shape (N, G, dof)
             Targets, in length units and rad; NaN for joints that do not move. N is at least 1.
-        until : ndarray, shape (N,), optional
-            Threshold of the reward for each trial. The first trial whose reward exceeds the
-            threshold for this trial is the last trial that is counted.
 
         Returns
         -------
         Trials
-            Results of the counted trials, in order. There are fewer than N trials if the session's
-            budget ends, or if a reward exceeds its threshold.
+            Results of the trials, in order. There are fewer than N trials if the session's budget
+            ends.
 
         Raises
         ------
         BudgetError
             No trial of the session is left.
         """
-        trials = self._session.trials(hand_sequences, targets, until=until)
+        trials = self._session.trials(hand_sequences, targets)
+        self._remember(hand_sequences, targets, trials)
+        return trials
+
+    def _remember(self, hand_sequences: str | list[str], targets: Array, trials: Trials) -> None:
+        """Count trials, and remember their best if it is the best so far."""
         rewards = trials.rewards
         best = int(rewards.argmax())
         if rewards[best] > self.reward:
@@ -177,7 +245,6 @@ class Attempts:
                 self.targets = targets[best].copy()
         self.trials_made += len(rewards)
         self.left -= len(rewards)
-        return trials
 
     @property
     def solution(self) -> tuple[Movement, ...]:

@@ -2,6 +2,7 @@
 
 import math
 from collections import namedtuple
+from itertools import count
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +15,7 @@ from coartic.baselines.cma_strategy import EvolutionStrategy
 from coartic.baselines.hill_climbing import HillClimbing
 from coartic.baselines.policy_gradient import PolicyGradient
 from coartic.baselines.random_search import RandomSearch, RandomSearchHands
+from coartic.baselines.uninformed import Attempts, Draw
 from coartic.method import MethodError, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.motion.solution import movements_of
@@ -86,6 +88,67 @@ def trials_of(method, monkeypatch, **options):
         patch.setattr(Session, "trials", recorded)
         solve(method, "two-armed-1", **options)
     return made
+
+
+def draw_one(rng, hills, made):
+    """Draw hands at random, and targets around their centre.
+
+    The spread becomes smaller after every 40 trials. The first trial with hands has no targets.
+    """
+    hands = "".join(rng.choice(["L", "R"], 4))
+    if hands not in hills:
+        return Draw(hands, np.full(36, np.nan), -np.inf)
+    centre, value = hills[hands]
+    return Draw(hands, centre + 0.1 / (1 + made // 40) * rng.standard_normal(36), value)
+
+
+@pytest.mark.parametrize("world", [MotionModel(), MotionModel(motor_noise=0.01)])
+@pytest.mark.parametrize("seed", range(3))
+def test_trials_drawn_ahead_are_those_of_a_loop_that_makes_one_at_a_time(seed, world):
+    task, trials = load_task("two-armed-1"), 600
+    moves = np.tile([True, False, *[True] * 8], (4, 1))  # the base is locked in y
+
+    def new_session():
+        return Session(task, seed, OPTIMISER_INFORMATION, model=world, trial_budget=trials)
+
+    session, hills, slow = new_session(), {}, []
+    for made in range(trials):
+        draw = draw_one(session.rng, hills, made)
+        targets = np.full((1, 4, 10), np.nan)
+        targets[:, moves] = draw.values
+        results = session.trials([draw.hand_sequence], targets)
+        slow.append((draw, results.rewards[0]))
+        if results.rewards[0] > draw.threshold:
+            hills[draw.hand_sequence] = results.reached[0][moves], results.rewards[0]
+
+    ahead, hills, fast, calls = new_session(), {}, [], 0
+    attempts = Attempts(ahead, 10 * trials)
+
+    def draws():
+        for made in count(attempts.trials_made):
+            draw = draw_one(ahead.rng, hills, made)
+            yield draw
+            if draw.hand_sequence not in hills or made % 40 == 39:
+                return
+
+    while attempts.left > 0:
+        calls += 1
+        drawn, results = attempts.run_ahead(draws)
+        fast += zip(drawn, results.rewards, strict=True)
+        last, reward = fast[-1]
+        if reward > last.threshold:
+            hills[last.hand_sequence] = results.reached[-1][moves], reward
+
+    assert ahead.rewards == session.rewards
+    assert ahead.rng.bit_generator.state == session.rng.bit_generator.state
+    for (one, one_reward), (other, other_reward) in zip(slow, fast, strict=True):
+        assert (one.hand_sequence, one.threshold) == (other.hand_sequence, other.threshold)
+        np.testing.assert_array_equal(one.values, other.values)
+        assert one_reward == other_reward
+    best, best_reward = max(slow, key=lambda trial: trial[1])
+    assert (attempts.reward, attempts.hand_sequence) == (best_reward, best.hand_sequence)
+    assert attempts.best_trial == [reward for _, reward in slow].index(best_reward)
+    assert calls < trials / 3
 
 
 @pytest.mark.parametrize("begin", ["correction", "best"])
