@@ -216,7 +216,7 @@ def test_what_is_refused():
 
 
 def test_the_example_of_score():
-    assert doctest.testmod(coartic.gym) == (0, 2)
+    assert doctest.testmod(coartic.gym.scores) == (0, 2)
 
 
 def test_a_family_is_scored_on_its_test_instances():
