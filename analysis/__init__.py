@@ -30,7 +30,6 @@ _MODULES = {
     "other_tasks": "coartic.analysis.statistics",
     "ranking": "coartic.analysis.frames",
     "read_hits": "coartic.analysis.recordings",
-    "relative_gaps": "coartic.analysis.frames",
     "shares": "coartic.analysis.frames",
     "solutions_of": "coartic.analysis.recordings",
     "table": "coartic.analysis.tables",

@@ -11,10 +11,22 @@ each run, and the columns
   hands, negative ticks.
 
 Gaps, shares and rankings are computed from the *value* of each run: its reward, or minus its
-``mean_ticks`` in a world with motor noise (:func:`.run_values`). If you have the costs of an
-``Objective``, use their negatives as rewards. The functions raise CoarticError for a frame with
-wrong values. Functions with a result for each method also raise CoarticError if the frame has a
-column ``world`` that names several worlds.
+``mean_ticks`` in a world with motor noise (:func:`.run_values`). The *gap* of a run is the fraction
+``(best known - value) / |best known|``: 0.01 stands for 1 % more ticks than the best known reward.
+It is NaN if the value or the best known reward is NaN, and can be negative by chance in a world
+with noise. If you have the costs of an ``Objective``, use their negatives as rewards.
+
+The functions raise CoarticError for a frame with wrong rewards:
+
+- A value is neither a finite number nor missing (NaN), or is above 0 (rewards are negative, costs
+  positive).
+- Without noise, a value is above the best known reward.
+- A best known reward is 0.
+- The frame has a column ``status``, which is ``ok`` for a run without noise and without a value, or
+  is not ``ok`` for a run with a value.
+
+Functions with a result for each method also raise CoarticError if the frame has a column ``world``
+that names several worlds.
 """
 
 from __future__ import annotations
@@ -298,45 +310,6 @@ def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     return runs
 
 
-def relative_gaps(frame: pd.DataFrame) -> pd.Series:
-    """Return the relative gap of each run to the best known reward of its task.
-
-    Parameters
-    ----------
-    frame : DataFrame
-        A row for each run, with columns ``reward`` (NaN for a failed run) and ``best_known`` (NaN
-        if the task has no best known reward), both in negative ticks. A run in a world with motor
-        noise has NaN as its reward, its mean ticks in column ``mean_ticks``, and a ``motor_noise``
-        above 0. Its gap can be negative by chance.
-
-    Returns
-    -------
-    Series
-        (best known - value) / \\|best known\\| as a fraction, with the index of ``frame``: 0.01
-        stands for 1 % more ticks than the best known reward. The value of a run is its reward, or
-        minus its mean ticks if it has no reward. The gap is NaN if the value or the best known
-        reward is NaN.
-
-    Raises
-    ------
-    CoarticError
-        - The frame is not a DataFrame, it has no rows, or a column is missing.
-        - A value is neither a finite number nor missing (NaN), or a reward is above 0 (rewards are
-          negative, costs positive).
-        - Without noise, a value is above the best known reward.
-        - A best known reward is 0.
-        - The frame has a column ``status``, which is ``ok`` for a run without noise and without a
-          value, or is not ``ok`` for a run with a value.
-
-    Examples
-    --------
-    >>> frame = pd.DataFrame({"reward": [-303, -292], "best_known": [-292, -292]})
-    >>> relative_gaps(frame).round(3).tolist()
-    [0.038, 0.0]
-    """
-    return _with_gaps(checked(frame, numbers=SCORES)).gap.set_axis(frame.index)
-
-
 def shares(frame: pd.DataFrame) -> pd.Series:
     """Return the share of the possible gain that each run reached.
 
@@ -348,16 +321,16 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     frame : DataFrame
         A row for each run, with columns ``reward``, ``best_known`` and ``corrective_best``, in
         negative ticks. ``corrective_best`` is the reward of the corrective process alone with its
-        best hands; :attr:`.Study.corrective_best` has the exceptions. For runs
-        in a world with motor noise, the columns are as in :func:`relative_gaps`.
+        best hands; :attr:`.Study.corrective_best` has the exceptions. Runs in a world with motor
+        noise have ``mean_ticks`` and ``motor_noise`` instead of a reward.
 
     Returns
     -------
     Series
         (value - corrective_best) / (best_known - corrective_best) as a fraction, with the index of
-        ``frame``. The value of a run is its reward or minus its mean ticks
-        (:func:`relative_gaps`). The share is negative if the corrective process alone is better
-        than the run. It is NaN if one of the three numbers is NaN, or if nothing can be gained:
+        ``frame``. The value of a run is its reward or minus its mean ticks. The share is negative
+        if the corrective process alone is better than the run. It is NaN if one of the three
+        numbers is NaN, or if nothing can be gained:
 
         - the best known reward of the run is not above its ``corrective_best``;
         - in a world with noise: the mean of ``best_known - corrective_best`` over all runs with the
@@ -366,8 +339,8 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Raises
     ------
     CoarticError
-        A column is missing or a reward is wrong (:func:`relative_gaps`), or, without noise,
-        ``corrective_best`` is above the best known reward.
+        A column is missing, a reward is wrong, or, without noise, ``corrective_best`` is above the
+        best known reward.
 
     Examples
     --------
@@ -458,7 +431,7 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
         - ``reward``: mean reward, negative ticks (in a world with noise, minus the mean of
           ``mean_ticks``);
         - ``n``: number of solved runs;
-        - ``gap``: mean gap, a fraction (:func:`relative_gaps`);
+        - ``gap``: mean gap, a fraction;
         - ``share``: mean share of the possible gain, a fraction (:func:`shares`); only if the frame
           has ``corrective_best``.
 
@@ -467,10 +440,9 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        A column or a name is missing, a reward is wrong (:func:`relative_gaps`, :func:`shares`), a
-        task has more than one best known reward or, without noise, more than one
-        ``corrective_best``, a run has two rows (:func:`ranking`), or column ``world`` names several
-        worlds.
+        A column or a name is missing, a reward is wrong (:func:`shares`), a task has more than one
+        best known reward or, without noise, more than one ``corrective_best``, a run has two rows
+        (:func:`ranking`), or column ``world`` names several worlds.
 
     Examples
     --------
@@ -525,10 +497,10 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         ascending order of their gaps; methods that are not ranked follow. All gaps and shares are
         fractions.
 
-        - ``gap``: mean gap (:func:`relative_gaps`): the mean over tasks of the mean over the runs
-          on each task. It is NaN for a method that is not ranked. ``gap_low`` and ``gap_high`` are
-          the ends of its 95 % interval for other runs on the same tasks; they are NaN with fewer
-          than five runs on a task.
+        - ``gap``: mean gap: the mean over tasks of the mean over the runs on each task. It is NaN
+          for a method that is not ranked. ``gap_low`` and ``gap_high`` are the ends of its 95 %
+          interval for other runs on the same tasks; they are NaN with fewer than five runs on a
+          task.
         - ``share``, ``share_low``, ``share_high``: mean share of the possible gain
           (:func:`shares`), over the tasks on which something can be gained. It is NaN for a method
           that is not ranked. ``without_gain`` is the number of the tasks counted in column
@@ -546,8 +518,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        - A column or a name is missing, or a reward is wrong (:func:`relative_gaps`,
-          :func:`shares`).
+        - A column or a name is missing, or a reward is wrong (:func:`shares`).
         - A task has more than one best known reward or, without noise, more than one
           ``corrective_best``.
         - A run has two rows.

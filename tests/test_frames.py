@@ -80,10 +80,10 @@ def test_a_frame_that_cannot_be_meant_is_refused(words, changes):
 def test_what_is_no_frame_and_no_argument_is_refused():
     frame = small_frame()
     for words, compute, *given in (
-        ("no rows", frames.relative_gaps, frame[:0]),
+        ("no rows", frames.by_task, frame[:0]),
         ("the frame is a list; it must be a pandas.DataFrame", frames.ranking, [1]),
-        ("no column reward", frames.relative_gaps, frame[["best_known"]]),
-        ("status has 'crashed'", frames.relative_gaps, frame.assign(status=["crashed", "ok"])),
+        ("no column reward", frames.by_task, frame.drop(columns="reward")),
+        ("status has 'crashed'", frames.by_task, frame.assign(status=["crashed", "ok"])),
         ("by is empty.*names", frames.means, frame, [], ["reward"]),
         ("trials has 0.0 in row 0", ecdf, frame.assign(trials=[0, 9]), [0.1]),
         *(("targets are", ecdf, frame, gaps) for gaps in ([], [-0.1], [1.001])),

@@ -52,13 +52,14 @@ def test_the_best_point_is_kept_with_its_solution():
     task = load_task("ascending")
     cost = objective("ascending")
     assert execute(task, cost.solution).reward == -319  # the corrective process alone
-    assert cost(cost.best_x) == cost.best_cost == 319 < cost(cost.x0)
+    assert cost.best_cost == 319 < cost(cost.x0)
     points = cost.x0 + 0.05 * np.random.default_rng(0).standard_normal((1500, cost.dim))
     best = points[cost.many(points).argmin()].copy()
-    for each in (points, cost.x0, cost.best_x):  # which may be changed without harm
+    for each in (points, cost.x0):  # which may be changed without harm
         each += 1.0
-    np.testing.assert_array_equal(cost.best_x, best)
-    assert -execute(task, cost.solution).reward == cost.best_cost == cost(cost.best_x) < 319
+    targets = np.array([movement.target for movement in cost.solution])
+    np.testing.assert_array_equal(targets[cost.joints], best)
+    assert -execute(task, cost.solution).reward == cost.best_cost == cost(best) < 319
     assert cost.history.cost.is_unique  # a point as good as the best is not a better one
 
 
@@ -101,14 +102,11 @@ def with_width(half_width):
         (COST.many, np.where(np.arange(18) == 7, np.nan, np.zeros((2, 18))),
          "point 0: some entries of goal 2 are NaN"),
         (COST, np.where(GOALS == 1, np.inf, COST.x0), "infinite"),
-        *((call, wrong, "it should not have masked entries")
-          for call, wrong in ((COST, MASKED), (COST.evaluations_to, MASKED))),
-        *((COST.evaluations_to, wrong, r"targets (are|is) .*(a cost, the ticks|real numbers)")
-          for wrong in ([500, -1.0], FAILED + 1)),
+        (COST, MASKED, "it should not have masked entries"),
         (with_width, 0, "half_width is .*; it must be a number from 1e-09 to 100"),
     ],
 )  # fmt: skip
-def test_what_is_no_point_no_target_and_no_width_is_refused(call, wrong, words):
+def test_what_is_no_point_and_no_width_is_refused(call, wrong, words):
     with pytest.raises(ValueError, match=words):
         call(wrong)
     assert COST.evaluations == 0
@@ -204,7 +202,7 @@ def test_what_is_known_of_a_task():
     budget=st.integers(1, 200),
     seed=st.integers(0, 99),
 )
-def test_history_and_evaluations_to_are_what_the_returned_costs_say(threads, sizes, budget, seed):
+def test_the_history_is_what_the_returned_costs_say(threads, sizes, budget, seed):
     """In batches of any size, 0 for a point alone; where the budget cuts a batch; after refused
     copies; and of threads, whose order is open."""
     cost, single = (objective("two-armed-1", "LRLR", budget=most) for most in (budget + 1, None))
@@ -232,14 +230,9 @@ def test_history_and_evaluations_to_are_what_the_returned_costs_say(threads, siz
         lowest = np.minimum.accumulate([alone, *costs[:budget]])
         first = [(int(np.argmax(lowest == each)), each) for each in np.unique(lowest)[::-1]]
         assert [*history.itertuples(index=False, name=None)] == first
-        for target in [*lowest, *(lowest + 0.5)]:
-            assert cost.evaluations_to(target) == np.argmax(lowest <= target)
     assert (np.diff(history.evaluations) > 0).all()
     assert (np.diff(history.cost) < 0).all()
     assert history.cost.iloc[-1] == cost.best_cost
-    assert cost.evaluations_to(history.cost).tolist() == history.evaluations.tolist()
-    targets = [0, cost.best_cost - 1, alone, FAILED]
-    assert cost.evaluations_to(targets).tolist() == [np.inf, np.inf, 0, 0]
 
 
 def test_a_budget_counts_the_trials_with_which_hands_are_chosen():

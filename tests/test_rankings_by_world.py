@@ -136,17 +136,18 @@ def test_a_ranking_of_two_worlds_is_refused():
         assert rows.gap["a"] == pytest.approx((311 - BEST) / BEST)
         assert rows.why["b"] == "1 of 2 runs failed"
     assert frames.by_task(runs[runs.world == NOISE]).reward.tolist() == [-311.0, -309.0]
-    assert frames.relative_gaps(runs).notna().sum() == 9  # runs are not compared with each other
+    assert frames.shares(runs).notna().sum() == 9  # runs are not compared with each other
 
 
 def test_a_value_above_the_best_known_is_chance_only_in_noise():
     frame = pd.DataFrame({"method": "a", "task": "t", "reward": [np.nan], "mean_ticks": 290.0,
                           "best_known": -292.0})  # fmt: skip
-    assert frames.relative_gaps(frame.assign(motor_noise=0.01)).iloc[0] == pytest.approx(-2 / 292)
+    (gap,) = frames.by_task(frame.assign(motor_noise=0.01)).gap
+    assert gap == pytest.approx(-2 / 292)
     with pytest.raises(CoarticError, match="above best_known"):
-        frames.relative_gaps(frame)
+        frames.by_task(frame)
     with pytest.raises(CoarticError, match="must be minus the ticks"):
-        frames.relative_gaps(frame.assign(mean_ticks=-290.0))
+        frames.by_task(frame.assign(mean_ticks=-290.0))
 
 
 def test_a_mean_that_is_missing_counts_as_a_failed_run():

@@ -156,15 +156,7 @@ class Objective:
 
     __slots__ = (
         *("joints", "configurations", "dim", "bounds", "_best_cost", "_best_hands"),
-        *(
-            "_best_targets",
-            "_best_x",
-            "_improvements",
-            "_codes",
-            "_end",
-            "_entries",
-            "_evaluations",
-        ),
+        *("_best_targets", "_improvements", "_codes", "_end", "_entries", "_evaluations"),
         *("_hands", "_process", "_session", "_targets", "_task"),
     )  # a misspelt attribute cannot be set by mistake
 
@@ -206,7 +198,6 @@ class Objective:
         self._evaluations = 0
         self._best_cost = float(min(-outcomes.rewards[best], FAILED))
         self._best_hands = self.hands
-        self._best_x: Array = np.full(self.dim, np.nan)
         self._best_targets = outcomes.targets[best].copy()
         self._improvements = [(0, self._best_cost)]
 
@@ -317,37 +308,6 @@ class Objective:
 
         return pd.DataFrame(self._improvements, columns=["evaluations", "cost"])
 
-    def evaluations_to(self, targets: ArrayLike) -> Any:
-        """Return the number of evaluations until the best cost reached each target cost.
-
-        Parameters
-        ----------
-        targets : array_like
-            Costs (in ticks).
-
-        Returns
-        -------
-        float or ndarray
-            Number of evaluations until the best cost was at or below each target; 0 if the
-            corrective process on its own reached it, and infinity if it has not been reached so
-            far. The result is a float if ``targets`` is a number, otherwise an array of the same
-            shape.
-
-        Raises
-        ------
-        ValueError
-            A target is not a number from 0 to ``FAILED``.
-        """
-        target_costs = real_array("targets", targets)
-        if not ((target_costs >= 0) & (target_costs <= FAILED)).all():
-            raise ValueError(
-                f"targets is {brief_value(target_costs.tolist())}; each entry must be a cost, the "
-                f"ticks of a trial, from 0 to {FAILED:,}"
-            )
-        evaluations, costs = np.array([*self._improvements, (np.inf, -np.inf)]).T
-        numbers = evaluations[np.searchsorted(-costs, -target_costs)]
-        return float(numbers) if target_costs.ndim == 0 else numbers
-
     @property
     def x0(self) -> Array:
         """A starting point for a search, shape ``(dim,)``, in length units and rad.
@@ -357,15 +317,6 @@ class Objective:
         array.
         """
         return self.configurations[self.joints].copy()
-
-    @property
-    def best_x(self) -> Array:
-        """A copy of the point of the best trial so far, shape ``(dim,)``.
-
-        In its trial, with the hands :attr:`best_hands`, this point cost :attr:`best_cost`. All
-        entries are NaN until a point is better than the corrective process on its own.
-        """
-        return self._best_x.copy()
 
     @property
     def solution(self) -> tuple[Movement, ...]:
@@ -560,7 +511,7 @@ class Objective:
         right). The number of its evaluation is ``evaluations``, from 1. The number of its trial in
         ``records`` is ``trial``, from 0.
         """
-        self._best_cost, self._best_x = cost, point.copy()
+        self._best_cost = cost
         if self._session.model.motor_noise > 0.0:  # a joint that keeps still has no noise
             self._best_targets = self._targets_of(point[None])[0]
         else:
