@@ -49,7 +49,8 @@ speed: $(READY)
 # each Python of this machine; what is not tried is named.
 release-check: CHECKED := --release
 release-check: shipped-check
-	COARTIC_PACKAGES=1 $(BIN)/python -m pytest -rs tests/test_packages.py
+	COARTIC_PACKAGES=1 $(BIN)/python -m pytest -rs tests/test_packages.py tests/test_versions.py \
+	  tests/test_families.py
 
 # Shipped runs, performed again: one of each cell of the comparison, and of each method on each family.
 shipped-check: $(READY)

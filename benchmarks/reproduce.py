@@ -145,6 +145,18 @@ def perform_runs_again(runs: Sequence[Row], registered: Registry) -> Iterator[tu
             yield stored_runs[id(job)], new_run
 
 
+def compare_again(
+    runs: Sequence[Row], registered: Registry, *, postures: bool = True
+) -> Iterator[tuple[Row, list[str]]]:
+    """Perform stored runs again, and yield each with what differs (:func:`compare_runs`).
+
+    The arguments ``runs`` and ``registered``, the order and the errors are those of
+    :func:`perform_runs_again`.
+    """
+    for stored, again in perform_runs_again(runs, registered):
+        yield stored, compare_runs(stored, again, postures=postures)
+
+
 def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
     """Select stored runs of a folder that can be performed here: every k-th run.
 
@@ -229,7 +241,7 @@ def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int,
     return executed, wrong
 
 
-def compare_runs(a: Row, b: Row) -> list[str]:
+def compare_runs(a: Row, b: Row, *, postures: bool = True) -> list[str]:
     """Compare the results of two runs, and describe the differences.
 
     The compared results are the status, the reason, the details, the counts, the movements of the
@@ -245,6 +257,9 @@ def compare_runs(a: Row, b: Row) -> list[str]:
     ----------
     a, b : Row
         The runs.
+    postures : bool
+        False to leave out details, and targets and paths of movements, which can differ in bits on
+        other processors. Hands and ticks of movements are compared all the same.
 
     Returns
     -------
@@ -255,7 +270,7 @@ def compare_runs(a: Row, b: Row) -> list[str]:
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
     details = ({k: v for k, v in run.details.items() if k != UNREPEATED} for run in (a, b))
-    pairs = [("details", *details)]
+    pairs = [("details", *details)] if postures else []
     names = ["status", "reason", "best_trial", "practice", *Meter.COUNTS]
     if a["run_id"] == b["run_id"] and a["noise_rule"] == b["noise_rule"]:
         names += OF_NOISE  # the id is the seed of the noise
@@ -264,7 +279,10 @@ def compare_runs(a: Row, b: Row) -> list[str]:
         f"{name}: {brief_value(x)} against {brief_value(y)}" for name, x, y in pairs if x != y
     ]
     for part, prefix in PREFIXES.items():
-        if a.movements.get(part, []) != b.movements.get(part, []):
+        first, second = (
+            [m if postures else m[:4] for m in run.movements.get(part, [])] for run in (a, b)
+        )
+        if first != second:
             words = [
                 f"{run[f'{prefix}reward']} with {run[f'{prefix}hands']}"
                 if part in run.movements

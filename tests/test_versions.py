@@ -6,23 +6,24 @@ from dataclasses import replace
 
 import check_shipped
 import pytest
-from check_shipped import SHORT_RUNS
 from pydantic import create_model
 
-from coartic import CoarticError, load_task
+from coartic import CoarticError, execute, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.include import include_folders
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.registry import built_in
-from coartic.benchmarks.reproduce import compare_runs, perform_runs_again
+from coartic.benchmarks.reproduce import compare_runs
 from coartic.benchmarks.runner import perform
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.worker import perform_job
+from coartic.method import run_method
 from coartic.runs.method_info import BUILT_IN, answer, method_info
 from coartic.runs.plan import Cell, Job, cell_of
-from coartic.runs.record import PARTS
+from coartic.runs.shipped import open_shipped
 from coartic.runs.store import open_store_for_writing
+from tests.support.processes import at_release
 from tests.support.suites import InProcess, cell_on, planned, run_and_write
 
 TASK = load_task("two-armed-2")
@@ -124,38 +125,76 @@ def built_in_digest(name):
     return cell_of(TASK, info, {}).digest
 
 
+SHORT_RUNS = {
+    "dual-process/EC1-uncorrected": ("two-armed-2", -357, "RRRR", 384_054),
+    "dual-process/EC4-uncorrected": ("two-armed-2", -357, "RRRR", 406_895),
+    "dual-process/custom": ("two-armed-2", -357, "RRRR", 821_009),
+    "trajectory-optimisation/path-length": ("descending", -304, "RRR", 306),
+    "trajectory-optimisation/squared-displacement": ("ascending", -298, "RRR", 94),
+    "trajectory-optimisation/acceleration": ("descending", -319, "RRR", 128),
+    "trajectory-optimisation/jerk": ("ascending", -323, "RRR", 23),
+    "trajectory-optimisation/hand-jerk": ("descending", -409, "RRR", 44),
+    "receding-horizon": ("ascending", -299, "RRR", 74),
+    "optimum/search": ("ascending", -292, "RRR", 46),
+    "optimum/in-model": ("ascending", -292, "RRR", 46),
+}
+"""Maps methods to the results of short runs with seed 1: task, reward, hands, and either the ticks
+of all movements or the number of iterations of the solver. These are methods without a shipped run,
+with 2,000 trials, and planners whose cheapest shipped run takes seconds, with the parameters of a
+quick check."""
+
+
+def short_run(name: str, task: str) -> tuple[str, int, str, int]:
+    """Perform the short run of a method, and return its entry in :data:`SHORT_RUNS`."""
+    info = built_in()[name]
+    trials = {"trials": 2000} if "trials" in info.defaults else {}
+    parameters = info.configure(trials | info.load().quick)
+    result, session = run_method(parameters, load_task(task), seed=1)
+    execution, meter = execute(task, result.solution), session.meter
+    effort = meter.movement_ticks or meter.solver_iterations
+    return task, int(execution.reward), execution.hands, int(effort)
+
+
 @pytest.mark.parametrize("name", SHORT_RUNS)
 def test_a_method_without_a_quick_shipped_run_has_a_short_one(name):
-    assert check_shipped.short_run(name, SHORT_RUNS[name][0]) == SHORT_RUNS[name]
+    assert short_run(name, SHORT_RUNS[name][0]) == SHORT_RUNS[name]
 
 
-def test_a_release_names_what_is_new(shipped_runs, monkeypatch):
-    """Methods and families that nothing would compare with later versions, with their entries."""
-    before = [*check_shipped.missing_entries(shipped_runs)]
-    entry = SHORT_RUNS["dual-process/EC4-uncorrected"]
-    monkeypatch.delitem(SHORT_RUNS, "dual-process/EC4-uncorrected")
-    monkeypatch.delitem(check_shipped.FAMILIES, "long/v1")
-    more = [each for each in check_shipped.missing_entries(shipped_runs) if each not in before]
-    method, family = more
-    assert f'"dual-process/EC4-uncorrected": {entry} to SHORT_RUNS' in method
-    assert f'"long/v1": "{check_shipped.family_hash("long/v1")}" to FAMILIES' in family
+@at_release
+def test_nothing_is_without_a_run_that_later_versions_can_be_compared_with(shipped_runs):
+    new = {}
+    for name in {*built_in()} - {*shipped_runs.method, *SHORT_RUNS}:
+        info, tasks = built_in()[name], map(load_task, ("two-armed-2", "ascending"))
+        task = next(task for task in tasks if info.inapplicable_reason(task) is None)
+        new[name] = short_run(name, task.name)
+    assert not new, f"add to SHORT_RUNS: {new}"
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_a_shipped_run_of_each_other_built_in_method_comes_back(shipped_runs, monkeypatch):
+def test_a_shipped_run_of_each_other_built_in_method_comes_back(shipped_runs):
     """To the tick and the hand, with rewards of all trials and all counts: this, not the text of
     the code, is what makes the numbers safe. Targets may differ in bits on other processors."""
-    found = []
-
-    def watched(*given):
-        for run, again in perform_runs_again(*given):
-            words = compare_runs(run, again)
-            found.extend(each for each in words if not each.startswith(("details", *PARTS)))
-            yield run, again
-
-    monkeypatch.setattr(check_shipped, "perform_runs_again", watched)
     runs = shipped_runs[shipped_runs.suite == "comparison"]
     shipped = {*runs.method} - {*SHORT_RUNS}
     rows = runs[runs.is_current & runs.method.isin(shipped)].groupby("method").head(1)
     assert len(rows) >= 0.75 * len(shipped)
-    assert [*check_shipped.differences(rows), *found] == []
+    assert [*check_shipped.differences(rows)] == []
+
+
+def test_a_run_that_no_longer_comes_back_is_named(shipped_runs):
+    """A tick, a hand, a reward or a count is a difference; a bit of a target is none."""
+    runs = shipped_runs[(shipped_runs.suite == "comparison") & shipped_runs.is_current]
+    row = runs[(runs.method == "random-search") & (runs.world == "")].head(1)
+    (change,) = row.run_id
+    with open_shipped("comparison") as store:
+        run = store.run(change)
+    moved = json.loads(json.dumps(run.movements))
+    goal, hand, kind, ticks, path = moved["solution"][0]
+    for ticks_here, target, count in ((ticks + 1, path, 1), (ticks, "[]", 0)):
+        first = [goal, hand, kind, ticks_here, target]
+        other = replace(run, movements=moved | {"solution": [first, *moved["solution"][1:]]})
+        assert len(compare_runs(run, other, postures=False)) == count
+        assert len(compare_runs(run, other)) == 1
+    assert compare_runs(run, run.with_values(trials=1), postures=False) == [
+        "trials: 10000 against 1"
+    ]

@@ -274,7 +274,7 @@ def _perform_again(
         Files with methods of the user.
     """
     from coartic.benchmarks.registry import registry
-    from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again, some_runs
+    from coartic.benchmarks.reproduce import compare_again, find_run, some_runs
     from coartic.runs.store import open_store
 
     registered = registry(method_file or [])
@@ -296,8 +296,7 @@ def _perform_again(
     differing = 0
     with Display() as display:
         display.show(f"Performing {pluralize(len(runs), 'run')} again")
-        for number, (stored, new) in enumerate(perform_runs_again(runs, registered), 1):
-            differences = compare_runs(stored, new)
+        for number, (stored, differences) in enumerate(compare_again(runs, registered), 1):
             differing += bool(differences)
             for difference in differences:
                 say(f"Run {stored['run_id']}, performed again: {difference}")

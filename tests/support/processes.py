@@ -10,6 +10,8 @@ import time
 import warnings
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -79,6 +81,11 @@ def apart(what, *arguments):
 
 def _say(answers, what, arguments):
     answers.send(what(*arguments))
+
+
+at_release = pytest.mark.skipif(
+    os.environ.get("COARTIC_PACKAGES") != "1", reason="only for a release: COARTIC_PACKAGES=1"
+)
 
 
 def pythons():
