@@ -446,7 +446,7 @@ class Study:
 
         - ``value``: the number that rankings compare, in negative ticks: the reward, or in a world
           with noise minus ``mean_ticks`` (:func:`.run_values`); NaN for a failed run;
-        - ``motor_noise``, ``norm`` and ``base_weight``: constants of the run's world;
+        - a column for each constant of the run's world (:data:`.WORLD`);
         - ``label``: label of the method, that is, its id with its setting;
         - ``ranked_as``: name of the row of the ranking to which the run belongs. It differs from
           ``label`` if two conditions of the learner, for one arm and for two arms, share a row;

@@ -127,9 +127,8 @@ class _Block(FileData):
     values is run. The values in ``grid`` take the place of those in ``parameters``."""
     model: Worlds | None = None
     """Table ``model``: the worlds in which methods practise and are scored. The table maps the
-    constants that differ from the paper's (``motor_noise``, ``norm``, ``base_weight``) to a value,
-    or to a list of values; there is a world for each combination of the values. By default it is
-    the table of the suite."""
+    constants (:data:`.WORLD`) that differ from the paper's to a value, or to a list of values;
+    there is a world for each combination of the values. By default it is the table of the suite."""
 
 
 class Suite(FileData):

@@ -161,13 +161,12 @@ class Method(ABC):
     not known. Readers can see from this attribute which tasks are new to the method. The attribute
     is not a part of the id of a run."""
     adapts_to: ClassVar[frozenset[str] | None] = None
-    """Constants of the motion model (:data:`.WORLD`: ``motor_noise``, ``norm`` and ``base_weight``)
-    that may differ from the paper's when the method runs. ``motor_noise`` may always differ. None,
-    the default, stands for
+    """Constants of the world (:data:`.WORLD`) that may differ from the paper's when the method
+    runs. ``motor_noise`` may always differ. None, the default, stands for
 
     - only ``motor_noise``, if the method declares the reward formula or the kinematic model,
       because such a method may itself compute lengths as in the paper;
-    - all three constants otherwise.
+    - all constants of the world otherwise.
     """
     stochastic: ClassVar[bool] = True
     """True if the results depend on the seed. If False, a suite runs the method once on each task
@@ -201,9 +200,9 @@ class Method(ABC):
     def refuses(cls, model: MotionModel) -> str | None:
         """Return a sentence on why the method cannot run under a motion model, or None.
 
-        The sentence names the first of the constants ``norm`` and ``base_weight`` that differs from
-        the paper's and to which the method does not adapt (:attr:`adapts_to`). Other constants of
-        the motion model, such as the motor noise, are never a reason.
+        The sentence names the first constant of the world that differs from the paper's and to
+        which the method does not adapt (:attr:`adapts_to`). Motor noise, and constants that are not
+        in :data:`.WORLD`, are never a reason.
         """
         adapts_to = cls.adapts_to
         if adapts_to is None:
