@@ -18,7 +18,12 @@ def page_of(tables):
     judged = claims[claims.suite.fillna("") != ""]
     judged = judged.sort_values("replicates", key=lambda of: of.map([*MARKS].index), kind="stable")
     missing = [name.replace("-", " ") for name in claims.index if name not in judged.index]
-    body = ["<h1>Replication: what of the paper comes out again?</h1>"]
+    counts = {verdict: (judged.replicates == verdict).sum() for verdict in MARKS}
+    words = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
+    body = [
+        "<h1>Replication: what of the paper comes out again?</h1>",
+        f"<p>Of {len(judged)} judged claims: {words}. † Goals are reconstructed.</p>",
+    ]
     if missing:
         body.append(
             f"<p>Not judged, for lack of runs: {html.escape(', '.join(missing))}. Suites "
@@ -84,10 +89,17 @@ def _with_sd(value, sd):
 def _table(headings, rows):
     """Return a table as HTML."""
     lines = [
-        "<tr>" + "".join(f"<{tag}>{html.escape(str(cell))}</{tag}>" for cell in row) + "</tr>"
+        "<tr>" + "".join(_cell(tag, str(cell)) for cell in row) + "</tr>"
         for tag, row in [("th", headings), *(("td", row) for row in rows)]
     ]
     return '<div class="scroll"><table>' + "".join(lines) + "</table></div>"
+
+
+def _cell(tag, text):
+    """Return a cell as HTML; words stand to the left."""
+    is_number = text[:1] in "−<–" or text[:1].isdigit()
+    kind = "" if is_number else ' class="text"'
+    return f"<{tag}{kind}>{html.escape(text)}</{tag}>"
 
 
 def _evidence(claim):

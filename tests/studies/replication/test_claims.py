@@ -548,3 +548,22 @@ def test_one_task_carries_no_claim_and_refutes_none():
     opposite = judged(CARRIED, "less")
     assert opposite.opposite_p_holm == others.p_holm > 0.05
     assert opposite.verdict == "undecided"
+
+
+def test_the_page_of_a_folder_counts_and_shows_what_the_tables_say(tables, tmp_path):
+    """As written and read again; nothing of a table is HTML."""
+    stored = {}
+    for name, table in tables.items():
+        if name == "claims":
+            table = table.assign(quote="<b> & more")
+        table.to_csv(tmp_path / f"{name}.csv")
+        stored[name] = pd.read_csv(tmp_path / f"{name}.csv", index_col=0)
+    page = importlib.import_module("page").page_of(stored)
+    judged = tables["claims"][tables["claims"].suite != ""]
+    for verdict, count in judged.replicates.value_counts().items():
+        assert f"{count} {verdict}" in page
+    assert f"Of {len(judged)} judged claims" in page
+    assert page.count("<details>") == len(judged)
+    assert "<b> & more" not in page
+    assert "&lt;b&gt; &amp; more" in page
+    assert page.count("<tr>") == 2 + len(judged) + len(tables["rewards"])
