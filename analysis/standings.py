@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import lru_cache
 
+import numpy as np
 import pandas as pd
 
 from coartic.analysis.frames import ranking
@@ -44,6 +45,8 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 
 NOT_HERE = "no runs in this world"
 """Reason for not ranking a method that has runs only in other worlds of the folder."""
+_OWN_NOT_HERE = f"{NOT_HERE}; coartic run with its method file makes them, if it can run here"
+"""The same for a method from a file."""
 ESTIMATES, COUNTS = ("gap", "share"), ("tasks", "runs", "failed")
 """Columns of :func:`.ranking` that are estimates with an interval, and columns that are counts."""
 _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "parameters", "information"]
@@ -154,7 +157,8 @@ def standings(study: Study) -> pd.DataFrame:
         - how many executions failed in a world with noise.
 
         The frame also contains a row for each method, except searches for the optimum, that has
-        runs only in other worlds (:attr:`.Study.elsewhere`). The reason is then :data:`NOT_HERE`.
+        runs only in other worlds (:attr:`.Study.elsewhere`). The reason then begins with
+        :data:`NOT_HERE`.
 
     Raises
     ------
@@ -165,7 +169,8 @@ def standings(study: Study) -> pd.DataFrame:
     elsewhere = study.elsewhere
     if len(elsewhere):
         elsewhere = elsewhere[~elsewhere.is_search.astype(bool)]
-        elsewhere = elsewhere.assign(why=NOT_HERE, note="", **dict.fromkeys(COUNTS, 0))
+        why = np.where(elsewhere.built_in.astype(bool), NOT_HERE, _OWN_NOT_HERE)
+        elsewhere = elsewhere.assign(why=why, note="", **dict.fromkeys(COUNTS, 0))
     if not len(runs):
         estimates = [f"{name}{end}" for name in ESTIMATES for end in ("", "_low", "_high")]
         columns = [*estimates, "without_gain", *COUNTS, "why", "note", *study.methods]

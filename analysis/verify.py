@@ -113,7 +113,7 @@ def stored_task(content: str) -> Any:
     task = cell.task
     task.model = SimpleNamespace(**WORLD | vars(cell.model))
     method, given = plain["method"], plain["parameters"]
-    changed = [f"{name}={x}" for name, x in given.items() if x != method["defaults"].get(name)]
+    changed = [f"{n}={x}" for n, x in given.items() if repr(x) != repr(method["defaults"].get(n))]
     world = [f"{name}={x}" for name, x in vars(task.model).items() if x != WORLD.get(name, x)]
     task.labels = task.name, method["name"], ", ".join(changed), ", ".join(world)
     plain["method"] = method["name"]

@@ -294,7 +294,8 @@ def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:
         )
         agree(part_name, f"method {method.name!r}", f"{kind} {method.code}", hint)
         cell_named = f"{cell.label} on {name}"
-        agree(part_name, f"the list of parameters of {cell_named}", sorted(cell.parameters))
+        older = ": repeat the `coartic run` command of the older folder"
+        agree(part_name, f"the list of parameters of {cell_named}", sorted(cell.parameters), older)
         for key, value in cell.parameters.items():
             agree(part_name, f"{key} of {cell_named}", value)
 

@@ -11,19 +11,22 @@ from __future__ import annotations
 import ast
 import hashlib
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from concurrent.futures import BrokenExecutor
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from importlib import metadata
-from inspect import signature
+from inspect import isclass, signature
 from pathlib import Path
 from typing import Any
 
 from pebble import ProcessExpired, ProcessPool
+from pydantic import BaseModel
 
 from coartic.benchmarks.processes import CONTEXT, signal_name
 from coartic.errors import CoarticError
+from coartic.internal.limits import brief_value
 from coartic.internal.text import MAX_LINE_LENGTH, error_line, plain
 from coartic.internal.threads import begin_worker
 from coartic.internal.toml_files import read_bytes
@@ -44,7 +47,7 @@ from coartic.runs.method_info import (
 _ANSWER_S = 300.0  # longest wait for an answer: libraries can take long to import
 
 
-def read_file(path: Path) -> list[MethodInfo]:
+def read_file(path: Path, ends: ExitStack | None = None) -> list[MethodInfo]:
     """Return the declarations of the methods of a file.
 
     A new process imports the file. The new process stays alive, and answers later questions about
@@ -54,6 +57,8 @@ def read_file(path: Path) -> list[MethodInfo]:
     ----------
     path : Path
         The method file, whose name ends in ``.py``.
+    ends : contextlib.ExitStack, optional
+        Stack with which the new process ends. By default it ends with this process.
 
     Returns
     -------
@@ -72,6 +77,10 @@ def read_file(path: Path) -> list[MethodInfo]:
     if path.suffix != ".py":
         raise CoarticError(f"{shown}: the name of a method file must end in .py")
     reader = ProcessPool(1, initializer=begin_worker, context=CONTEXT)
+    if ends is not None:
+        ends.callback(reader.join)
+        ends.callback(reader.stop)
+        ends.callback(READERS.pop, str(path), None)
     infos: list[MethodInfo] = _ask(reader, shown, _declarations, path, shown)
     READERS[str(path)] = partial(_ask, reader, shown, _answer, path)
     return infos
@@ -167,13 +176,17 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
     Raises
     ------
     CoarticError
-        The file cannot be imported or defines no complete method; one of the attributes ``name``,
-        ``title``, ``citation``, ``tuned_on``, ``information``, ``adapts_to`` and ``facts`` of a
-        method has a wrong type; its function ``solve`` (or ``optimise``) has wrong arguments; or
-        the method has a function ``why_not`` (the old name of ``inapplicable_reason``).
+        The file cannot be imported or defines no complete method; a module beside it is not the
+        one that it would import (:func:`_check_helpers`); an attribute of a method, such as
+        ``name`` or ``Parameters``, has a wrong type; its function ``solve`` (or ``optimise``) has
+        wrong arguments; or the method has a function ``why_not`` (the old name of
+        ``inapplicable_reason``).
     """
     try:
+        _check_helpers(path, path.parent)
         module, loaded = load_file(path)
+    except CoarticError:
+        raise
     except BaseException as error:
         raise CoarticError(f"{shown} cannot be imported: {error_line(error)}") from None
     methods = methods_in(module)
@@ -187,6 +200,8 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
             f"{shown} must define a subclass of coartic.Method or coartic.Optimiser{missing}"
         )
     files = _user_files(loaded)
+    for file in files:
+        _check_helpers(file, path.parent)
     packages, infos = _packages_of({path, *files}), list[MethodInfo]()
     for method in methods:
         where = f"{shown}: {method.__name__}"
@@ -211,6 +226,19 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
             )
         if not isinstance(method.facts, Facts):
             raise CoarticError(f"{where}: facts must be Facts(...), not {method.facts!r}")
+        parameters, names = method.Parameters, method.files
+        for attribute, is_right, wanted in (
+            ("Parameters", isclass(parameters) and issubclass(parameters, BaseModel),
+             "a subclass of coartic.method.Parameters"),
+            ("stochastic", type(method.stochastic) is bool, "True or False"),
+            ("version", type(method.version) is int, "an integer"),
+            ("quick", isinstance(method.quick, Mapping), "a dict of parameters"),
+            ("files", isinstance(names, tuple | list) and all(isinstance(x, str) for x in names),
+             'a tuple of names, such as ("weights.npz",)'),
+        ):  # fmt: skip
+            if not is_right:
+                value = brief_value(getattr(method, attribute))
+                raise CoarticError(f"{where}: {attribute} must be {wanted}, not {value}")
         if hasattr(method, "why_not"):  # its old name, which would silently not be called
             raise CoarticError(f"{where}: why_not is called inapplicable_reason now: rename it")
         function, arguments = "solve", "session"
@@ -264,20 +292,46 @@ def _user_files(names: Iterable[str]) -> set[Path]:
     return {path for name, path in files.items() if is_users(name, path)}
 
 
+def _check_helpers(file: Path, folder: Path) -> None:
+    """Check that a Python file does not import a module whose name hides one in a folder.
+
+    Raises CoarticError if the file imports a name that the folder has as a module, and that is also
+    the name of a module of Python, or of another module that is loaded already. Such a module would
+    be used in place of that in the folder.
+    """
+    for name in sorted(_imports_of(file)):
+        helpers = folder / f"{name}.py", folder / name / "__init__.py"
+        loaded = getattr(sys.modules.get(name), "__file__", None)
+        for helper in filter(Path.is_file, helpers):
+            if name in sys.stdlib_module_names or (
+                loaded is not None and not helper.samefile(loaded)
+            ):
+                raise CoarticError(
+                    f"{plain(str(file))}: {name} is also the name of a module that Python or "
+                    f"coartic uses, which would be imported in place of {plain(str(helper))}: give "
+                    "this module another name"
+                )
+
+
+def _imports_of(file: Path) -> set[str]:
+    """Return the names of the modules that a Python file imports, without their submodules."""
+    if file.suffix != ".py":
+        return set()
+    names = set[str]()
+    for node in ast.walk(ast.parse(file.read_bytes())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names.add(node.module)
+    return {name.partition(".")[0] for name in names}
+
+
 def _packages_of(files: Iterable[Path]) -> dict[str, str]:
     """Return a dict that maps the installed packages that Python files import to their versions.
 
     Modules of the standard library and of coartic are left out.
     """
-    names = set[str]()
-    for file in files:
-        if file.suffix == ".py":
-            for node in ast.walk(ast.parse(file.read_bytes())):
-                if isinstance(node, ast.Import):
-                    names |= {alias.name for alias in node.names}
-                elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                    names.add(node.module)
-    tops = {name.partition(".")[0] for name in names} - {"coartic"} - sys.stdlib_module_names
+    tops = set[str]().union(*map(_imports_of, files)) - {"coartic"} - sys.stdlib_module_names
     if not tops:
         return {}
     installed = metadata.packages_distributions()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import warnings
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -92,7 +94,8 @@ class Request(FileData):
     methods: tuple[str, ...] = ()
     """Methods to run: ids, exploration conditions such as ``"EC1"``, or wildcards such as
     ``"optimum/*"``. By default all methods of the suite are run; ``"*"`` stands for them, too. A
-    method that the suite does not have is run on all planned tasks to which it applies."""
+    method that the suite does not have is run on all planned tasks to which it applies, in each
+    world in which the suite has the task."""
     method_files: tuple[Path, ...] = ()
     """Python files that define your own methods. If ``methods`` or the suite names a method of a
     file, by its id or by a wildcard (in ``methods`` a wildcard other than ``"*"``), only the named
@@ -174,7 +177,8 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
     request = request_for(**options)
     if not isinstance(suite, Suite):
         suite = load_suite(str(suite))
-    return plan(suite, request, registry(request.method_files))
+    with ExitStack() as ends:
+        return plan(suite, request, registry(request.method_files, ends))
 
 
 def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
@@ -185,12 +189,13 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     """
     names, own, task_named = _asked_tasks(suite, request)
     job = partial(_job_of, suite, request)
-    jobs = [*_suite_jobs(suite, request, registered, own, task_named, job)]
+    named = {name: methods_named(name, registered) for name in request.methods if name != WILDCARD}
+    left_out = set(registered) - {*itertools.chain(*named.values())}
+    if not request.methods or WILDCARD in request.methods:
+        left_out = set()
+    jobs = [*_suite_jobs(suite, request, registered, own, task_named, job, left_out)]
     of_suite = dict.fromkeys(planned.cell.method.name for planned in jobs)
-    asked = {
-        name: [*of_suite] if name == WILDCARD else methods_named(name, registered)
-        for name in request.methods
-    }
+    asked = {name: named.get(name, [*of_suite]) for name in request.methods}
     asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     ids = dict.fromkeys(itertools.chain(*asked.values()))
     if not request.methods:
@@ -198,13 +203,15 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     methods = [registered[name] for name in ids]
     tasks = tasks_by_name([*(planned.cell.task for planned in jobs), *own.values()])
     cells = {(planned.cell.task.name, planned.cell.label) for planned in jobs}
+    worlds = _worlds_beside(jobs, request)
+    usual = [world for world in worlds if world == PAPER] or worlds
     jobs += [
         job(task, method, world=world)
-        for task, method, world in itertools.product(
-            tasks.values(), methods, _worlds_beside(jobs, request)
-        )
+        for task, method in itertools.product(tasks.values(), methods)
         if (task.name in own or method.name not in of_suite)
         and (task.name, method.name) not in cells
+        for world in (usual if method.name in of_suite else worlds)
+        if (task.name in own or task.name in worlds[world])
         and method.refuses(world) is None
         and method.inapplicable_reason(task) is None
     ]
@@ -370,17 +377,17 @@ def _world_of(request: Request) -> MotionModel:
     return request.model[0] if request.model else PAPER
 
 
-def _worlds_beside(jobs: Sequence[Job], request: Request) -> list[MotionModel]:
-    """Return the motion models in which methods run that a request adds to a suite.
+def _worlds_beside(jobs: Sequence[Job], request: Request) -> dict[MotionModel, set[str]]:
+    """Return the worlds of the jobs of a suite, with the names of the tasks of their jobs.
 
-    - If the request has a model, only that model is returned.
-    - If there are no ``jobs`` of the suite, or one of them is in the paper's world, only the
-      paper's model is returned.
-    - Otherwise the models of all jobs are returned, each once.
+    Methods that the request adds to the suite run in all of them; methods of the suite run on added
+    tasks in the paper's world, if the suite has it. Without jobs there is only the world of the
+    request.
     """
-    worlds = {made.cell.world: PAPER._replace(**differences(made.cell.model)) for made in jobs}
-    is_usual = request.model or not worlds or "" in worlds
-    return [_world_of(request)] if is_usual else [*worlds.values()]
+    worlds = defaultdict[MotionModel, set[str]](set) if jobs else {_world_of(request): set[str]()}
+    for made in jobs:
+        worlds[PAPER._replace(**differences(made.cell.model))].add(made.cell.task.name)
+    return worlds
 
 
 def _suite_jobs(
@@ -390,6 +397,7 @@ def _suite_jobs(
     own: Collection[str],
     task_named: TaskNamed,
     job: Callable[..., Job],
+    left_out: Collection[str],
 ) -> Iterator[Job]:
     """Yield the jobs of all blocks of a suite.
 
@@ -405,6 +413,8 @@ def _suite_jobs(
         Function that returns the task with a given name.
     job : callable
         Function that makes a job: :func:`_job_of` without its first two arguments.
+    left_out : collection of str
+        Ids of methods that will not run. It is no error if they do not apply.
 
     Yields
     ------
@@ -440,7 +450,7 @@ def _suite_jobs(
                     reason = method.refuses(chosen) or method.inapplicable_reason(task, parameters)
                     if reason is None:
                         yield job(task, method, parameters, block.runs, chosen)
-                    elif not is_open:
+                    elif not is_open and method.name not in left_out:
                         raise CoarticError(
                             f"{reason}; name in a block only methods that apply to all of its tasks"
                         )
@@ -517,11 +527,18 @@ def _why_nothing_runs(
 def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
     """Return the first job of each cell.
 
-    Raises CoarticError if two jobs of the same cell have different numbers of runs.
+    Raises CoarticError if two jobs of the same cell have different numbers of runs, or if two cells
+    have the same name, because tables would take them for one.
     """
-    distinct = dict[str, Job]()
+    distinct, named = dict[str, Job](), dict[tuple[str, str, str], str]()
     for job in jobs:
-        first_job = distinct.setdefault(job.cell.digest, job)
+        cell = job.cell
+        if cell.digest != named.setdefault((cell.task.name, cell.world, cell.label), cell.digest):
+            raise CoarticError(
+                f"two settings have the name {cell.label} on {cell.task.name}: leave out one of "
+                "the values, such as 1 and '1'"
+            )
+        first_job = distinct.setdefault(cell.digest, job)
         if first_job.numbers != job.numbers:
             raise CoarticError(
                 f"{job.cell.label} on {job.cell.task.name}: the suite asks for "

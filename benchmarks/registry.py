@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
@@ -29,13 +30,17 @@ id."""
 Registry = Mapping[str, MethodInfo]
 
 
-def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
+def registry(
+    method_files: Iterable[Path] = (), ends: ExitStack | None = None
+) -> dict[str, MethodInfo]:
     """Return a dict that maps ids to the declarations of all known methods.
 
     Parameters
     ----------
     method_files : iterable of Path
         Python files that define methods of the user.
+    ends : contextlib.ExitStack, optional
+        Stack with which the processes end that read the files (:func:`.read_file`).
 
     Returns
     -------
@@ -52,7 +57,7 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
         from coartic.benchmarks.method_files import read_file  # most commands do not need it
 
-        for info in read_file(path):
+        for info in read_file(path, ends):
             check_id(info.name, info.origin, infos)
             infos[info.name] = info
     return infos

@@ -36,12 +36,12 @@ def _plain_value(value: Any) -> _Plain:
     """Validate the value of a parameter of a method, and return it.
 
     The value is True, False, a finite number, a string or a list of finite numbers. A list is
-    returned as a tuple of floats. Raises a validation error for any other value.
+    returned as a tuple. Raises a validation error for any other value.
     """
     numbers = value if isinstance(value, list | tuple) else [value]
     largest = sys.float_info.max
     if numbers and all(isinstance(x, int | float) and abs(x) <= largest for x in numbers):
-        return value if value is numbers[0] else tuple(map(float, numbers))
+        return value if value is numbers[0] else tuple(numbers)
     if isinstance(value, str):
         return value
     problem = "should be true, false, a finite number, a string or a list of finite numbers"

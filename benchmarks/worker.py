@@ -13,6 +13,7 @@ import sys
 import time
 import traceback
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -27,6 +28,7 @@ from coartic.method import (
     Session,
     UndeclaredError,
     outline_of,
+    reason_against,
 )
 from coartic.motion.trials import trials_outside
 from coartic.runs.method_info import MethodInfo
@@ -157,7 +159,7 @@ def perform_job(job: Job) -> list[Outcome]:
     try:
         method = cell.method.configure(cell.parameters)
         results: Sequence[Any]
-        reason_not = method.refuses(cell.model) or method.inapplicable_reason(outline_of(cell.task))
+        reason_not = method.refuses(cell.model) or reason_against(method, outline_of(cell.task))
         if reason_not is not None:
             raise MethodError("infeasible", str(reason_not))
         if len(sessions) == 1:
@@ -197,26 +199,28 @@ def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times)
     times : Times
         Times and memory of the run.
     """
-    spent: dict[str, Any] = {
-        "used": tuple(sorted(item.value for item in session.used)),
-        "meter": session.meter,
-        "rewards": session.rewards,
-        "times": times,
-    }
     try:
         if isinstance(result, MethodError):
             details = _plain_details(result.details)
-            return Outcome(result.outcome, str(result), details=details, **spent)
-        if isinstance(result, BaseException):
+            outcome = Outcome(result.outcome, str(result), details=details)
+        elif isinstance(result, BaseException):
             raise result
-        return Outcome("ok", **spent, **statement(result, session))
+        else:
+            outcome = Outcome("ok", **statement(result, session))
     except SolutionError as error:
-        return Outcome("solver-failed", str(error), **spent)
+        outcome = Outcome("solver-failed", str(error))
     except NotApplicableError as error:
-        return Outcome("infeasible", str(error), **spent)
+        outcome = Outcome("infeasible", str(error))
     except BaseException as error:
         _log.debug("Traceback of the run:", exc_info=error)
-        return Outcome("crashed", _place_of(error, method) + error_line(error), **spent)
+        outcome = Outcome("crashed", _place_of(error, method) + error_line(error))
+    return replace(
+        outcome,  # a solution can use the corrective process
+        used=tuple(sorted(item.value for item in session.used)),
+        meter=session.meter,
+        rewards=session.rewards,
+        times=times,
+    )
 
 
 def _place_of(error: BaseException, method: MethodInfo) -> str:

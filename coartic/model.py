@@ -127,7 +127,7 @@ _BOUNDS = {
 
 
 def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
-    """Check the constants of a model, and return the model unchanged.
+    """Check the constants of a model, and return the model with its numbers as floats.
 
     Parameters
     ----------
@@ -135,6 +135,13 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
     radius : float, optional
         Radius of the goals (in length units). If it is passed, ``correction_tolerance`` must be
         smaller than the radius.
+
+    Returns
+    -------
+    MotionModel
+        The same constants. Numbers are of type ``float``, ``max_iterations`` is an ``int``, and
+        ``norm`` a ``str``, so that a world has one name and one id, whether 4 or 4.0 was written.
+        A model that has these types is returned itself.
 
     Raises
     ------
@@ -146,10 +153,12 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
     """
     if not isinstance(model, MotionModel):
         raise TypeError(f"model is {brief_value(model)}; it must be a MotionModel")
+    constants: dict[str, Any] = {"norm": str(model.norm)}
     for name, (least, largest) in _BOUNDS.items():
         value = getattr(model, name)
         if value is not None or not name.endswith("_tolerance"):
             check_limits(f"model.{name}", value, least, largest)
+            constants[name] = type(least)(value)
     if model.norm not in get_args(Norm):
         raise ValueError(
             f"model.norm is {brief_value(model.norm)}; it must be 'euclidean' or 'maximum'"
@@ -160,16 +169,18 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
             f"goals' radius {radius}, or the corrective process would end outside the goal (None "
             "stands for a tenth of the radius)"
         )
-    return model
+    has_types = all(type(getattr(model, name)) is type(constants[name]) for name in constants)
+    return model if has_types else model._replace(**constants)
 
 
 def check_exact(model: MotionModel, *, radius: float | None = None) -> MotionModel:
-    """Check a model for a function that draws no random numbers, and return it unchanged.
+    """Check a model for a function that draws no random numbers (:func:`check_model`).
 
     Raises the errors of :func:`check_model`, and ValueError if the model has motor noise.
     """
-    refuse_noise(check_model(model, radius=radius))
-    return model
+    checked = check_model(model, radius=radius)
+    refuse_noise(checked)
+    return checked
 
 
 def refuse_noise(model: MotionModel) -> None:
@@ -191,8 +202,8 @@ def model_from(constants: MotionModel | Mapping[str, Any]) -> MotionModel:
     Parameters
     ----------
     constants : mapping of str to object, or MotionModel
-        Dict that maps the names of the changed constants to their values. A MotionModel is checked
-        and returned unchanged.
+        Dict that maps the names of the changed constants to their values. A MotionModel is only
+        checked (:func:`check_model`).
 
     Returns
     -------

@@ -18,6 +18,9 @@ from coartic.method import (
     MODULES,
     BudgetError,
     Information,
+    Method,
+    MethodError,
+    Result,
     Session,
     UndeclaredError,
     outline_of,
@@ -42,6 +45,25 @@ def test_a_budget_that_ends_within_a_batch():
     assert len(session.trials([], targets[:0]).ticks) == 0
     with pytest.raises(BudgetError, match="the budget of 7 trials is spent"):
         session.trials(hands, targets)
+
+
+class FailsOnce(Method):
+    name = title = "test/fails-once"
+    information = BLIND
+
+    def solve(self, session):
+        if session.seed == 1:
+            raise MethodError("infeasible", "not with seed 1")
+        return Result((), {"seed": session.seed})
+
+
+def test_a_failure_in_a_batch_stays_in_its_place():
+    """The other sessions are solved, and each result belongs to its session."""
+    sessions = [Session(load_task("ascending"), seed, BLIND) for seed in range(3)]
+    first, failed, last = FailsOnce().solve_together(sessions)
+    assert (first.details, last.details) == ({"seed": 0}, {"seed": 2})
+    assert isinstance(failed, MethodError)
+    assert (failed.outcome, str(failed)) == ("infeasible", "not with seed 1")
 
 
 def test_a_method_without_the_corrective_process_does_not_see_it():
@@ -147,7 +169,7 @@ def test_a_method_refuses_worlds_whose_lengths_it_does_not_know(name):
 
 def test_a_planner_that_counts_lengths_itself_is_not_run_in_another_world():
     method = METHODS["posture-based/one-goal"]()
-    with pytest.raises(NotApplicableError, match="model.base_weight is 4; .* leave the constant"):
+    with pytest.raises(NotApplicableError, match="model.base_weight is 4.0; .* leave the constant"):
         run_method(method, "ascending", model=MotionModel(base_weight=4))
     with pytest.raises(ValueError, match="model.norm is 'taxi'; it must be 'euclidean' or"):
         run_method(method, "ascending", model=MotionModel(norm="taxi"))

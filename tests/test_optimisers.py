@@ -100,8 +100,10 @@ def with_width(half_width):
         (COST, np.zeros((18, 18)), r"use many\(x\) for rows, many\(x.T\) for columns"),
         (COST, COST.x0 + 1j, "it should be real numbers"),
         (COST.many, np.where(np.arange(18) == 7, np.nan, np.zeros((2, 18))),
-         "point 0: some entries of goal 2 are NaN"),
-        (COST, np.where(GOALS == 1, np.inf, COST.x0), "infinite"),
+         "entry 7 of point 0 is nan; each entry must be finite"),
+        (COST, np.full(18, np.nan), "entry 0 of point 0 is nan"),
+        (COST.movements, np.full(18, np.nan), "entry 0 of point 0 is nan"),
+        (COST, np.where(GOALS == 1, np.inf, COST.x0), "is inf; each entry must be finite"),
         (COST, MASKED, "it should not have masked entries"),
         (with_width, 0, "half_width is .*; it must be a number from 1e-09 to 100"),
     ],
@@ -135,7 +137,6 @@ def test_points_become_movements():
     task = load_task("two-armed-2")
     cost = objective(task, "RLRR")
     points = cost.x0 + 0.3 * np.random.default_rng(2).standard_normal((30, cost.dim))
-    points[3, np.argwhere(cost.joints)[:, 0] == 1] = np.nan  # the corrective process alone
     for hands in (None, "RRRR", "LLRL"):
         costs = cost.many(points, hands)
         for point, due in zip(points, costs, strict=True):
@@ -308,7 +309,17 @@ def test_a_point_that_is_returned_is_the_solution_in_noise_alone():
 
 @pytest.mark.parametrize(
     "wrong",
-    [3.0, "x", (), np.zeros(3), np.full(40, np.inf), ([0.0], "RRRR"), ([0.0] * 40, "RR"), {"x": 1}],
+    [
+        3.0,
+        "x",
+        (),
+        np.zeros(3),
+        np.full(40, np.inf),
+        np.full(40, np.nan),
+        ([0.0], "RRRR"),
+        ([0.0] * 40, "RR"),
+        {"x": 1},
+    ],
 )
 def test_what_is_no_point_cannot_be_recommended(wrong):
     with pytest.raises(ValueError, match="optimise returned .* must return a point of 40 numbers"):

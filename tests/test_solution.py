@@ -17,7 +17,7 @@ from coartic import (
     load_task,
     movements_of,
 )
-from coartic.runs.record import MAX_STEPS, execute_all
+from coartic.runs.record import MAX_STEPS, execute_all, movement_data, movement_from
 from tests.support.strategies import make_trials, posture, tiny_task
 
 
@@ -87,6 +87,20 @@ def test_solutions_that_break_the_rules(movements, words):
     with pytest.raises(CoarticError) as caught:
         execute(task, movements)
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["planned", "learned", "corrective", "path"])
+def test_waypoints_belong_to_a_path_that_ends_at_its_target(kind):
+    way = np.array([posture(1.0), posture(2.0)])
+    for target, is_end in ((None, True), (way[-1], True), (way[0], False)):
+        movement = Movement(1, "right", kind, target, waypoints=way)
+        if kind == "path" and is_end:
+            np.testing.assert_array_equal(movement_from(movement_data(movement)).waypoints, way)
+            continue
+        with pytest.raises(
+            ValueError, match=f"waypoints and kind '{kind}'; its kind must be 'path'"
+        ):
+            movement_data(movement)
 
 
 def test_a_base_that_a_solver_moves_a_little_is_held():

@@ -89,14 +89,17 @@ def test_a_request_has_one_world():
 
 
 def test_methods_beside_the_blocks_run_in_the_worlds_of_the_suite(suite):
-    """In the paper's world if a block has it, or else in all that the blocks have."""
+    """In all worlds that the suite has of a task, and in no other."""
     noisy = BLOCK + "model = { motor_noise = [0.01, 0.02] }\n"
+    other = BLOCK.replace("ascending", "descending")
     for blocks, worlds in (
         ([noisy], ["motor_noise=0.01", "motor_noise=0.02"]),
-        ([noisy, BLOCK], [""]),
+        ([noisy, BLOCK, other], ["motor_noise=0.01", "motor_noise=0.02", ""]),
     ):
         plan = plan_suite(suite(*blocks), methods=["random-search", "hill-climbing"])
-        assert [job.cell.world for job in plan if job.cell.method.name == "hill-climbing"] == worlds
+        beside = [job.cell for job in plan if job.cell.method.name == "hill-climbing"]
+        assert [cell.world for cell in beside if cell.task.name == "ascending"] == worlds
+        assert {cell.world for cell in beside if cell.task.name == "descending"} <= {""}
     plan = plan_suite(suite(BLOCK), methods=["hill-climbing"], model={"motor_noise": 0.01})
     assert worlds_in(plan) == ["motor_noise=0.01"]
 

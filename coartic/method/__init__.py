@@ -20,6 +20,7 @@ from coartic.method.base import (
     answer_of,
     built_in_methods,
     outline_of,
+    reason_against,
     run_method,
 )
 from coartic.method.session import (
@@ -53,5 +54,6 @@ __all__ = [
     "answer_of",
     "built_in_methods",
     "outline_of",
+    "reason_against",
     "run_method",
 ]

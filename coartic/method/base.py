@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.dataclasses import dataclass as checked_dataclass
 
 from coartic.errors import NotApplicableError
-from coartic.internal.limits import MAX_RUN_SEED, check_limits
+from coartic.internal.limits import MAX_RUN_SEED, brief_value, check_limits
 from coartic.internal.validation import describe_validation_errors
 from coartic.method.session import Information, MethodError, Session
 from coartic.model import PAPER, WORLD, MotionModel, check_model, differences
@@ -276,6 +276,20 @@ class Method(ABC):
         return results
 
 
+def reason_against(method: Method, task: Outline) -> str | None:
+    """Return why a method does not apply to a task, or None (:meth:`Method.inapplicable_reason`).
+
+    Raises TypeError if the method answers anything else, such as ``""`` or False.
+    """
+    reason = method.inapplicable_reason(task)
+    if reason is None or (isinstance(reason, str) and reason.strip()):
+        return reason
+    raise TypeError(
+        f"inapplicable_reason returned {brief_value(reason)}; it must return a sentence, or None "
+        "if the method applies"
+    )
+
+
 MODULES = (
     "coartic.learner.method",
     "coartic.baselines.corrective_alone",
@@ -348,8 +362,8 @@ def run_method(
         or does not fit the radius of the goals.
     """
     chosen = as_task(task)
-    check_model(model, radius=chosen.radius)
-    reason = method.refuses(model) or method.inapplicable_reason(outline_of(chosen))
+    model = check_model(model, radius=chosen.radius)
+    reason = method.refuses(model) or reason_against(method, outline_of(chosen))
     if reason is not None:
         raise NotApplicableError(reason)
     built_in = (getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES)

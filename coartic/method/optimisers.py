@@ -109,10 +109,8 @@ class Objective:
       takes more than ``FAILED`` ticks.
     - If a movement misses its goal, the corrective process acts. The ticks of the corrective
       movement are part of the cost.
-    - If all entries of a goal are NaN, there is no movement to a target: only the corrective
-      process acts. If the hand is in the goal already, this costs no ticks, whereas a movement to a
-      target takes at least one tick.
-    - A trial fails if its point has an entry beyond ±100,000.
+    - A point with an entry that is NaN or infinite is refused: no trial is made. A trial fails if
+      its point has an entry beyond ±100,000.
     - With motor noise the cost of a point differs from trial to trial. :attr:`best_cost` is the
       lowest of many noisy costs, and therefore partly luck. To compare points fairly, evaluate them
       with the same noise draws (:meth:`many`).
@@ -343,9 +341,8 @@ class Objective:
         Returns
         -------
         tuple of Movement
-            A movement for each goal. A movement has no target if all entries of its goal are NaN.
-            Otherwise the target has an entry for each entry of a configuration. For entries that
-            are not in the point, it is
+            A movement for each goal. Its target has an entry for each entry of a configuration.
+            For entries that are not in the point, it is
 
             - without motor noise, the value of the coordinate when the movement begins;
             - without motor noise, for goals after a goal at which the trial fails, the value of the
@@ -358,7 +355,7 @@ class Objective:
             The model has no motor noise, and the objective is that of a method, which cannot see
             its task. The method can use :attr:`solution` instead.
         ValueError
-            ``x`` or ``hands`` does not fit.
+            ``x`` or ``hands`` does not fit, or an entry of ``x`` is NaN or infinite.
         """
         point = _entries_of("x", x)
         if point.shape != (self.dim,):
@@ -370,10 +367,8 @@ class Objective:
             return movements_of(chosen, targets[0])
         task = self.task
         records = make_trials(compiled_task(task, self._session.model), codes, targets[:, :, None])
-        has_target = ~np.isnan(targets[0]).all(axis=1, keepdims=True)
-        targets = self._targets_in(records, 0)
-        is_missing = np.isnan(targets) & has_target  # at goals after the failure of the trial
-        return movements_of(chosen, np.where(is_missing, task.q0, targets))
+        targets = self._targets_in(records, 0)  # NaN at goals after the failure of the trial
+        return movements_of(chosen, np.where(np.isnan(targets), task.q0, targets))
 
     # Evaluation.
 
@@ -436,9 +431,8 @@ class Objective:
         Parameters
         ----------
         points : array_like, shape (N, dim)
-            Points as rows. Entries are finite, except that all entries of a goal are NaN if only
-            the corrective process is to act at this goal. Coordinates that are not in a point do
-            not move. A trial with an entry beyond ±100,000 fails.
+            Points as rows, with finite entries. Coordinates that are not in a point do not move. A
+            trial with an entry beyond ±100,000 fails.
         hands : str or sequence of str, optional
             One hand sequence for all points (``"RRLR"``), or a sequence for each; by default
             :attr:`hands`.
@@ -463,8 +457,7 @@ class Objective:
             An argument cannot be used:
 
             - ``points`` has the wrong shape;
-            - an entry is infinite;
-            - a goal has both NaN and other entries;
+            - an entry is NaN or infinite;
             - ``hands`` do not fit the task, or their number is not N;
             - ``draws`` are not N integers from 0 to 2^53.
         """
@@ -536,22 +529,14 @@ class Objective:
         return targets
 
     def _check(self, points: Array) -> None:
-        """Check points, shape ``(N, dim)``.
-
-        Raises ValueError for an infinite entry, and for a goal with both NaN and other entries.
-        """
-        if points.min(initial=0.0) >= -MAX_ENTRY and points.max(initial=0.0) <= MAX_ENTRY:
-            return
-        missing = (np.isnan(self._targets_of(points)) & self.joints).sum(axis=2)
-        in_part = (missing > 0) & (missing < self.joints.sum(axis=1))
-        if in_part.any():
-            point, goal = np.argwhere(in_part)[0]
+        """Raise ValueError if an entry of points, shape ``(N, dim)``, is NaN or infinite."""
+        is_wrong = ~np.isfinite(points)
+        if is_wrong.any():
+            point, entry = np.argwhere(is_wrong)[0]
             raise ValueError(
-                f"point {point}: some entries of goal {goal + 1} are NaN; all of them must be NaN "
-                "(only the corrective process acts), or none"
+                f"entry {entry} of point {point} is {points[point, entry]}; each entry must be "
+                "finite. Has the search diverged?"
             )
-        if np.isinf(points).any():
-            raise ValueError("points has infinite entries; each entry must be finite or NaN")
 
     @property
     def trials_left(self) -> int:

@@ -305,7 +305,7 @@ def compiled_task(
     if latest is not None and latest.task is task and latest.model is model:  # noqa: SIM102
         if latest.options == options:
             return latest
-    check_model(model, radius=task.radius)
+    model = check_model(model, radius=task.radius)
     goals = [check_goal(goal, task.radius) for goal in task.goals]
     _last_compiled = compiled = CompiledTask(
         task=task,

@@ -9,6 +9,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -22,7 +23,7 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import error_line, plain
 from coartic.internal.user_files import import_from
 from coartic.internal.validation import explain
-from coartic.method import Facts, Method, Outline, outline_of
+from coartic.method import Facts, Method, Outline, outline_of, reason_against
 from coartic.model import MotionModel, differences
 from coartic.tasks.task import Task
 
@@ -36,9 +37,11 @@ ALWAYS_IN_IDS = frozenset(
         *("other_arm", "period", "pull", "rounds", "sigma", "starts", "stop", "stored", "trials"),
     }
 )
-"""Names of parameters that are always hashed for the id of a run. Do not add names. Any other
-parameter is hashed only if its value is not the default. Therefore a new parameter of a method, or
-a new field of an exploration condition, does not change the ids of existing runs."""
+"""Names of parameters of built-in methods that are always hashed for the id of a run. Do not add
+names. Any other parameter of a built-in method is hashed only if its value is not the default.
+Therefore a new parameter of a method, or a new field of an exploration condition, does not change
+the ids of existing runs. All parameters of a method from a file are hashed, because its defaults
+may come from the environment or from another file."""
 _INFORMED = {"pull": 0.0, "direction": "next-goal"}
 _SUBTASK = {"discount": 0.0, "counted": "later"}
 WITHDRAWN: dict[str, dict[str, Any]] = {
@@ -113,19 +116,34 @@ class MethodInfo:
     def configure(self, parameters: Mapping[str, Any]) -> Method:
         """Import the method, and return an instance of its class with given parameters.
 
-        For a parameter that is not passed, the default is used. Raises ValueError for a wrong
+        For a parameter that is not passed, the default is used. Raises CoarticError for a wrong
         parameter.
         """
         method = self.load()
-        return method(method.Parameters(**_without_withdrawn(method, parameters)))
+        return method(_validated(method, parameters))
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """Return a dict of the parameters that identify a run, as plain data.
 
-        The dict contains those parameters of the method that are in :data:`ALWAYS_IN_IDS`, and all
-        parameters that differ from their defaults. Raises CoarticError for a wrong parameter.
+        The values are those of :func:`canonical_parameters`, so that ``complete`` of the result is
+        the result. Raises CoarticError for a wrong parameter.
         """
-        return dict(self._ask("complete", parameters))
+        return self.identifying(self._ask("complete", parameters))
+
+    def identifying(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
+        """Return those of all parameters of the method that are hashed for the id of a run.
+
+        These are all parameters of a method from a file. Of a built-in method they are those in
+        :data:`ALWAYS_IN_IDS`, all parameters that differ from their defaults, and those of
+        :data:`WITHDRAWN`.
+        """
+        return {
+            name: value
+            for name, value in {**parameters, **WITHDRAWN.get(self.name, {})}.items()
+            if not self.is_ours
+            or name in ALWAYS_IN_IDS
+            or not same_value(value, self.defaults[name])
+        }
 
     def inapplicable_reason(
         self, task: Task, parameters: Mapping[str, Any] | None = None
@@ -135,8 +153,8 @@ class MethodInfo:
         For a parameter that is not passed, the default is used. Raises CoarticError for a wrong
         parameter, or if the method cannot say whether it applies.
         """
-        reason = self._ask("inapplicable_reason", parameters or {}, *outline_of(task))
-        return None if reason is None else plain(str(reason))
+        reason: str | None = self._ask("inapplicable_reason", parameters or {}, *outline_of(task))
+        return reason and plain(reason)
 
     def refuses(self, model: MotionModel) -> str | None:
         """Return why the method cannot run under a motion model; None if it can."""
@@ -205,31 +223,73 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         wanted = {key: config.get(key) for key in ("extra", "frozen")}
         return {"quick": dict(method.quick), "config": wanted}
     parameters, *outline = arguments
-    parameters = _without_withdrawn(method, parameters)
+    if question == "complete":
+        return canonical_parameters(method, parameters)
+    typed = _validated(method, parameters)
+    task = Outline(*outline)._replace(hands=tuple(outline[3]))
     try:
-        typed = method.Parameters.model_validate(parameters)
+        return reason_against(method(typed), task)
+    except Exception as error:
+        raise CoarticError(
+            f"method {method.name!r} cannot say whether it applies to task {task.name!r}: "
+            f"{error_line(error)}"
+        ) from None
+
+
+def canonical_parameters(method: type[Method], parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return all parameters of a method in the form in which they are hashed, stored and run.
+
+    The values are validated by ``method.Parameters`` and written as JSON. A worker, and whoever
+    performs a stored run again, validates these values once more, with those that were defaults.
+    Therefore a second validation must not change them. Raises CoarticError if it does, or if a
+    parameter is wrong.
+    """
+    typed = _validated(method, parameters)
+    again = _validated(method, _dumped(method, typed))  # 1 of a float's default is 1.0 now
+    for name in method.Parameters.model_fields:
+        value, new = getattr(typed, name), getattr(again, name)
+        if value != new:
+            raise CoarticError(
+                f"method {method.name!r}: {name} is {brief_value(value)}, and {brief_value(new)} "
+                "when it is stored, read back and validated again. Its type and its validators "
+                "must keep a default, and a value that they returned: convert it in the method"
+            )
+    return _dumped(method, again)
+
+
+def _validated(method: type[Method], parameters: Mapping[str, Any]) -> Any:
+    """Return an instance of ``method.Parameters``, as from the JSON of the parameters.
+
+    Raises CoarticError for a wrong parameter.
+    """
+    given = _without_withdrawn(method, parameters)
+    try:
+        return method.Parameters.model_validate_json(json.dumps(given))
     except ValidationError as error:
         names = list(method.Parameters.model_fields)
         problem, listed = explain(error, names), ", ".join(names) or "none"
         raise CoarticError(
             f"method {method.name!r}: {problem} (its parameters: {listed})"
         ) from None
-    if question == "complete":
-        _plain_parameters(method, typed.model_dump())  # mode json has None for some NaN
-        values = _plain_parameters(method, typed.model_dump(mode="json"))
-        return {
-            name: value
-            for name, value in values.items()
-            if name in ALWAYS_IN_IDS or value != _defaults(method)[name]
-        } | WITHDRAWN.get(method.name, {})
-    task = Outline(*outline)._replace(hands=tuple(outline[3]))
-    try:
-        return method(typed).inapplicable_reason(task)
-    except Exception as error:
-        raise CoarticError(
-            f"method {method.name!r} cannot say whether it applies to task {task.name!r}: "
-            f"{error_line(error)}"
-        ) from None
+
+
+def _dumped(method: type[Method], typed: Any) -> dict[str, Any]:
+    """Return the parameters in an instance of ``method.Parameters`` as plain data."""
+    _plain_parameters(method, typed.model_dump())  # mode json has None for some NaN
+    return _plain_parameters(method, typed.model_dump(mode="json"))
+
+
+def same_value(first: Any, second: Any) -> bool:
+    """Return whether two values of a parameter are the same, as plain data of the same type.
+
+    In contrast to ``==``, the values 1, 1.0 and True differ.
+
+    Examples
+    --------
+    >>> same_value([0.5, None], [0.5, None]), same_value(1, True)
+    (True, False)
+    """
+    return json.dumps(first, sort_keys=True) == json.dumps(second, sort_keys=True)
 
 
 def _without_withdrawn(method: type[Method], parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -271,9 +331,12 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 def _defaults(method: type[Method]) -> dict[str, Any]:
     """Return a dict that maps a method's parameters to their defaults, as plain data.
 
-    The value of a parameter without a default is None. Raises CoarticError for a default that is
-    infinite or NaN.
+    They are written as :func:`canonical_parameters` writes them, if the method can do without any
+    other value. The value of a parameter without a default is None. Raises CoarticError for a
+    default that is infinite or NaN.
     """
+    with suppress(Exception):  # parameters that are required, or refuse their defaults
+        return canonical_parameters(method, {})
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
         for name, field in method.Parameters.model_fields.items()
@@ -285,12 +348,23 @@ def _plain_parameters(method: type[Method], values: Mapping[str, Any]) -> dict[s
     """Return a copy of ``values`` in which each value is plain data.
 
     A value that JSON does not have becomes a string. Raises CoarticError for a value that contains
-    infinity or NaN.
+    infinity or NaN, or a set.
     """
+
+    def as_text(value: object) -> str:
+        if isinstance(value, set | frozenset):
+            raise TypeError
+        return str(value)
+
     plain_values = {}
     for name, value in values.items():
         try:
-            plain_values[name] = json.loads(json.dumps(value, default=str, allow_nan=False))
+            plain_values[name] = json.loads(json.dumps(value, default=as_text, allow_nan=False))
+        except TypeError:
+            raise CoarticError(
+                f"method {method.name!r}: {name} is {brief_value(value)}; a parameter must be "
+                "plain data, and no set, which has no order: use a tuple"
+            ) from None
         except ValueError:
             raise CoarticError(
                 f"method {method.name!r}: {name} is {brief_value(value)}; a parameter must be "

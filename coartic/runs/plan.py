@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from coartic.errors import CoarticError
-from coartic.model import PAPER, MotionModel, differences
-from coartic.runs.method_info import MethodInfo
+from coartic.model import PAPER, MotionModel, check_model, differences
+from coartic.runs.method_info import MethodInfo, same_value
 from coartic.tasks.task import Task
 
 
@@ -35,7 +35,8 @@ class Cell:
     """Motion model of the trials and of the scoring, with the tolerances for the task."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "model", self.model.for_radius(self.task.radius))
+        model = check_model(self.model).for_radius(self.task.radius)
+        object.__setattr__(self, "model", model)
 
     @cached_property
     def world(self) -> str:
@@ -53,7 +54,7 @@ class Cell:
             {
                 name: value
                 for name, value in self.parameters.items()
-                if name not in defaults or value != defaults[name]
+                if name not in defaults or not same_value(value, defaults[name])
             }
         )
 

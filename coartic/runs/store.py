@@ -34,6 +34,7 @@ from coartic.errors import CoarticError
 from coartic.internal.files import make_folder
 from coartic.internal.text import plain
 from coartic.internal.validation import explain
+from coartic.model import WORLD
 from coartic.motion.solution import Movement
 from coartic.robot import Array
 from coartic.runs.plan import Cell, Job, hash_of
@@ -137,7 +138,8 @@ class Store:
         Raises
         ------
         CoarticError
-            The folder has results of another suite, or cannot be written.
+            The folder has results of another suite, or cannot be written; or a cell would not come
+            back from the file as it is (:func:`_checked_row`).
         """
         first = plan[0]
         content = dict(made_with) | {"time_limit_s": first.time_limit_s}
@@ -150,12 +152,34 @@ class Store:
                         f"{self.folder} has results of suite {name!r}: choose another folder for "
                         f"suite {first.suite!r}"
                     )
+            self._mend_worlds()
             self._db.execute("DELETE FROM suite")
             self._db.execute("UPDATE cells SET position = NULL, runs = NULL")
             self._insert("suite", name=first.suite, seed=first.seed, content=json.dumps(content))
+            known = dict[str, Any]()
             for position, job in enumerate(plan):
-                row = _cell_row(job.cell) | {"position": position, "runs": job.numbers[-1] + 1}
-                self._insert("cells", **row)
+                place = {"position": position, "runs": job.numbers[-1] + 1}
+                self._insert("cells", **_checked_row(job.cell, known), **place)
+
+    def _mend_worlds(self) -> None:
+        """Write cells again whose world has an integer constant, as version 7.0.0 stored it.
+
+        Their runs stay. Cells and runs get the ids of the world with the same constant as a float.
+        """
+        query = """SELECT id, content FROM cells WHERE json_valid(content)
+            AND 'integer' IN (json_type(content, '$.model.motor_noise'),
+                json_type(content, '$.model.base_weight'))"""
+        for old_id, content in self._rows(query):
+            cell: Cell = _CELL.validate_json(content)
+            self._insert("cells", **_cell_row(cell))
+            runs = self._rows("SELECT suite_seed, run FROM results WHERE cell = ?", old_id)
+            for seed, number in runs:
+                self._db.execute(
+                    """UPDATE OR REPLACE results SET cell = ?, run_id = ?
+                    WHERE cell = ? AND suite_seed = ? AND run = ?""",
+                    (cell.id, Job(cell, seed, (number,)).run_id(number), old_id, seed, number),
+                )
+            self._db.execute("DELETE FROM cells WHERE id = ?", (old_id,))
 
     def plan(self) -> list[Job]:
         """Return the plan of the folder.
@@ -615,12 +639,32 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
     }
 
 
+def _checked_row(cell: Cell, known: dict[str, Any]) -> dict[str, Any]:
+    """Return the row of a cell, from which the same cell is read.
+
+    ``known`` is that of :func:`_cell_from`. Raises CoarticError if the row cannot be written, or if
+    another cell is read from it: its runs could not be found again.
+    """
+    problem = "its values change"
+    try:
+        row = _cell_row(cell)
+        if _cell_from(row["id"], row["content"], known) == cell:
+            return row
+    except (ValueError, TypeError) as error:
+        problem = explain(error) if isinstance(error, ValidationError) else plain(str(error))
+    raise CoarticError(
+        f"{cell.method.name} on {cell.task.name} cannot be stored and read back ({problem}): write "
+        "plain numbers and strings"
+    )
+
+
 def _cell_from(cell_id: str, content: str, known: dict[str, Any] | None = None) -> Cell:
     """Return the cell that is stored as JSON in table ``cells``.
 
     Attribute ``where`` of the cell's method is empty. ``known`` is a dict that maps the JSON of
     tasks and methods of earlier cells to these objects: the cell shares the equal ones, and its own
-    are added. Raises ValueError if ``content`` is not the JSON of a cell with the id ``cell_id``.
+    are added. Raises ValueError if ``content`` is not the JSON of a cell with the id ``cell_id``,
+    and CoarticError if it is one that :meth:`Store.replace_plan` mends.
     """
     data = json.loads(content)
     keys = {}
@@ -631,6 +675,11 @@ def _cell_from(cell_id: str, content: str, known: dict[str, Any] | None = None) 
     if known is not None:
         known |= {key: getattr(cell, name) for name, key in keys.items()}
     if cell.id != cell_id:
+        if any(type(data["model"].get(name)) is int for name in WORLD):
+            raise CoarticError(
+                f"version 7.0.0 stored an integer as a constant of a world of {cell.task.name}: "
+                f"{_RESUME}, which mends the folder and keeps its runs"
+            )
         raise ValueError(f"{cell.label} on {cell.task.name} does not match the id of its cell")
     return cell
 
