@@ -39,6 +39,7 @@ def bibliography(
     environment: Mapping[str, Any] | None = None,
     imports: Mapping[str, Sequence[str]] | None = None,
     worlds: Sequence[str] = ("",),
+    versions: Sequence[str] = (),
 ) -> str:
     """Return BibTeX entries for the software, the paper, and the works behind the methods.
 
@@ -65,6 +66,8 @@ def bibliography(
     worlds : sequence of str
         Names of the worlds of the runs (:attr:`.Study.worlds`); the empty string is the paper's
         world. If one of them is another world, the entry of the software names all worlds.
+    versions : sequence of str
+        Versions of coartic that made the runs. The entry of the software names them.
 
     Returns
     -------
@@ -75,6 +78,8 @@ def bibliography(
     note = f"Version {made_with.get('coartic') or __version__}"
     if commit := made_with.get("commit"):
         note += f", commit {commit['id']}{' with changes' if commit['dirty'] else ''}"
+    if others := [version for version in versions if version != made_with.get("coartic")]:
+        note += f"; runs made with {listed(others)}, too"
     if any(worlds):
         note += f"; runs in {listed(map(world_title, worlds))}"
     software = _misc(
@@ -87,12 +92,12 @@ def bibliography(
     )
     works = {**references(), "coartic": software}
     reasons = {"coartic": ["the software"], THE_PAPER: ["the paper"]}
-    others = []
+    of_files = []
     for name, method in methods.items():
         known = KNOWN_METHODS.get(name) if method.origin == BUILT_IN else None
         facts = known.facts if known else method.facts
         if known is None:
-            others.append(name)
+            of_files.append(name)
         for key in (*facts.works, *facts.solvers):
             if key in works:
                 reasons.setdefault(key, []).append(name)
@@ -101,8 +106,8 @@ def bibliography(
     for key in THEORIES if analysis else ():
         reasons.setdefault(key, []).append("theories that methods are compared with")
     entries = [f"{_comment(', '.join(whose))}\n{works[key]}" for key, whose in reasons.items()]
-    slug = slugs(others)
-    for name in others:
+    slug = slugs(of_files)
+    for name in of_files:
         if citation := " ".join(methods[name].citation.split()):
             title = latex(" ".join(methods[name].title.split()) or name)
             declared = _misc(f"method-{slug[name]}", title=title, note=latex(citation))

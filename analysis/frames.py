@@ -51,10 +51,10 @@ SCORES = ("reward", "best_known")
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
 MIN_GAIN = 0.01
-"""Smallest possible gain for which a share is computed in a world with noise, as a fraction of the
-best known reward. The possible gain is the difference between the best known reward and the reward
-of the corrective process alone. A smaller gain is about as large as the standard errors of these
-two mean rewards."""
+"""Smallest possible gain for which a share is computed, as a fraction of the best known reward. The
+possible gain is the difference between the best known reward and the reward of the corrective
+process alone. A smaller gain is a few ticks, so that one tick changes the share much. With noise it
+is about as large as the standard errors of these two mean rewards."""
 DUPLICATE = (
     "a run must not occur twice (if runs of two sources have the same numbers, add a column seed, "
     "folder or run_id; number the draws of a bootstrap in a column run)"
@@ -200,9 +200,8 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     The share is also NaN if
 
     - zero is NaN, or is not below the best known reward;
-    - in a world with noise, the mean of zero over the runs with this best known reward is less than
-      1 % below the best known reward (:data:`MIN_GAIN`), so that the share would be a matter of
-      chance.
+    - zero is less than 1 % below the best known reward (:data:`MIN_GAIN`). In a world with noise,
+      this zero is the mean over the runs with this best known reward.
 
     Raises
     ------
@@ -227,8 +226,9 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     possible = columns.best_known - columns[ZERO]
     refuse_rows(columns, ZERO, (possible < 0) & ~columns.is_noisy, highest)
     of_task = possible.groupby(columns.best_known).transform("mean")  # in noise zeros differ by run
-    is_chance = columns.is_noisy & (of_task < MIN_GAIN * columns.best_known.abs())
-    possible = possible.where((possible > 0) & ~is_chance)
+    gain = possible.mask(columns.is_noisy, of_task)
+    is_enough = (possible > 0) & ~(gain < MIN_GAIN * columns.best_known.abs())
+    possible = possible.where(is_enough)
     return columns.assign(share=(columns.value - columns[ZERO]) / possible)
 
 
@@ -330,11 +330,11 @@ def shares(frame: pd.DataFrame) -> pd.Series:
         (value - corrective_best) / (best_known - corrective_best) as a fraction, with the index of
         ``frame``. The value of a run is its reward or minus its mean ticks. The share is negative
         if the corrective process alone is better than the run. It is NaN if one of the three
-        numbers is NaN, or if nothing can be gained:
+        numbers is NaN, or if nearly nothing can be gained:
 
         - the best known reward of the run is not above its ``corrective_best``;
-        - in a world with noise: the mean of ``best_known - corrective_best`` over all runs with the
-          same best known reward is less than 1 % of this best known reward.
+        - ``best_known - corrective_best`` is less than 1 % of the best known reward. In a world
+          with noise, this is the mean over all runs with the same best known reward.
 
     Raises
     ------

@@ -43,20 +43,19 @@ COLORS = {
     "grape": "#4b2a9b",
     "navy": "#00558f",
     "forest": "#007c52",
+    "brick": "#a3182c",
     "rust": "#d55e00",
     "silver": "#8c8c8c",
     "azure": "#5bb8ea",
     "rose": "#dc9fc3",
+    "lime": "#8cbf26",
     "amber": "#eba717",
 }
 """Maps the name of each colour of methods to its hexadecimal code, from dark to light. ``page.css``
 has lighter colours of the same names for a dark page."""
 OWN_COLOR, OWN_MARK = "walnut", "star"
-"""Colour of the first nine methods from files, and marker of the first one. (Each setting of a
+"""Colour of the first eleven methods from files, and marker of the first one. (Each setting of a
 method counts.) No built-in method has this colour or this marker."""
-ORDER = ("azure", "rust", "navy", "rose", "ink", "grape", "silver", "amber", "forest")
-"""Names of the colours of built-in methods. The methods of a group take colours in this order,
-beginning at the first colour of the group (:data:`LOOKS_OF`)."""
 MARKS: dict[str, Any] = {
     "star": ("*", "-"),
     "diamond": ("D", (0, (9, 1.5))),
@@ -67,6 +66,8 @@ MARKS: dict[str, Any] = {
     "plus": ("P", (0, (5, 1.2, 1, 1.2))),
     "cross": ("X", (0, (7, 1, 3, 1))),
     "thin-diamond": ("d", "-"),
+    "hexagon": ("h", (0, (6, 1, 1, 1))),
+    "pentagon": ("p", (0, (5, 1, 5, 3))),
 }
 """Maps the name of each marker to Matplotlib's codes of the marker and of a line style. Methods
 with this marker have lines in this style."""
@@ -179,20 +180,24 @@ BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
 )
 """Names of the three groups of methods, which use the reward in different ways."""
 LOOKS_OF = {
-    BY_TRIAL: ("azure", ("diamond", "circle", "triangle")),
-    BY_FORMULA: ("amber", ("square", "inverted-triangle", "plus")),
-    WITHOUT_REWARD: ("azure", ("cross", "thin-diamond")),
+    BY_TRIAL: (
+        ("azure", "grape", "navy", "rose", "silver", "ink"),
+        ("triangle", "circle", "inverted-triangle", "hexagon"),
+    ),
+    BY_FORMULA: (("amber", "brick", "rust"), ("square", "plus", "cross", "pentagon")),
+    WITHOUT_REWARD: (("forest", "lime"), ("diamond", "thin-diamond")),
 }
-"""Maps each group to the first colour and to all markers of its built-in methods
-(:func:`_pairs_of`). The two groups that use the reward begin at different colours, so that the
-shortest-path plan looks different from the learners and searches with which figures compare it."""
+"""Maps each group to the colours and the markers of its built-in methods in figures with a line for
+each method (:func:`_pairs_of`). No two groups share a colour or a marker, so that both say how a
+method uses the reward, as in figures with a row for each method (:data:`KINDS`)."""
 KINDS = {
     BY_TRIAL: ("navy", "circle", "blue"),
     BY_FORMULA: ("rust", "square", "orange"),
     WITHOUT_REWARD: ("forest", "diamond", "green"),
 }
 """Maps each group to the colour and the marker of its built-in methods in figures with a row for
-each method, and to the word for this colour in captions."""
+each method, and to the word for this colour in captions. They are among those of
+:data:`LOOKS_OF`."""
 MARK = " ‡"
 """Mark after the title of a method for which there are warnings (:attr:`.Study.marks`)."""
 
@@ -383,16 +388,15 @@ def joined_label(one: str, two: str) -> str:
 
 
 def _pairs_of(group: str) -> list[tuple[str, str]]:
-    """Return all pairs of a colour of :data:`ORDER` and a marker of a group.
+    """Return all pairs of a colour and a marker of a group.
 
-    Each pair differs from the previous pair both in colour and in marker.
+    Each pair differs from the previous pair in colour.
     """
-    first, marks = LOOKS_OF[group]
-    begin = ORDER.index(first)
+    colors, marks = LOOKS_OF[group]
     return [
         (color, marks[(number + turn) % len(marks)])
         for turn in range(len(marks))
-        for number, color in enumerate(ORDER[begin:] + ORDER[:begin])
+        for number, color in enumerate(colors)
     ]
 
 
@@ -401,13 +405,17 @@ def _looks_of_built_in() -> dict[str, tuple[str, str]]:
 
     The dict contains only the methods that represent their algorithms (``headline`` of
     :class:`.Facts`). Each method takes the first free pair of its group (:func:`_pairs_of`). The
-    methods choose in the order of :data:`KNOWN_METHODS`, but learners for one arm choose last: each
+    methods choose in the order of :data:`KNOWN_METHODS`, but the corrective process alone, which
+    has no curve, chooses after the others, and learners for one arm choose last: each
     takes the first free pair with the colour of the first learner for two arms in
     :data:`RANKED_TOGETHER`.
     """
     looks, free = dict[str, tuple[str, str]](), {group: _pairs_of(group) for group in GROUPS}
     headlines = {name: each for name, each in KNOWN_METHODS.items() if each.facts.headline}
-    for name in sorted(headlines, key=RANKED_TOGETHER.__contains__):
+    without_curve = {name for name in headlines if name.startswith("corrective-alone/")}
+    for name in sorted(
+        headlines, key=lambda name: (name in RANKED_TOGETHER, name in without_curve)
+    ):
         pairs = free[_group_with({kind.value for kind in headlines[name].information})]
         colors = [looks[two][0] for two in RANKED_TOGETHER.get(name, ())[:1]]
         looks[name] = next(pair for pair in pairs if not colors or pair[0] in colors)
@@ -427,8 +435,8 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
     files come first.
 
     - A row that has a ``style`` already keeps it.
-    - The first nine rows of methods from files get the colour :data:`OWN_COLOR`, each with another
-      marker.
+    - The first eleven rows of methods from files get the colour :data:`OWN_COLOR`, each with
+      another marker.
     - Each other row gets the next free pair of its group. Pairs with a colour that does not occur
       in any ``style`` come first. After the last free pair, the first one is used again.
     """

@@ -29,7 +29,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, takewhile
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
 import scipy
@@ -56,6 +56,14 @@ from coartic.robot import HANDS, Array
 from coartic.tasks.optima import HASHED_FIELDS
 from coartic.tasks.task import hands_of
 
+Cached = TypeVar("Cached", bound=NDArray[Any])
+
+
+def _fixed(array: Cached) -> Cached:
+    """Return an array that all users of a study share, so that none can change it."""
+    array.setflags(write=False)
+    return array
+
 
 @dataclass(frozen=True)
 class Solutions:
@@ -81,13 +89,13 @@ class Solutions:
     def hands(self) -> NDArray[np.int64]:
         """Hands that hit the goals, shape ``(n, G)``: 0 for left, 1 for right."""
         hands = [[HANDS.index(hand) for hand in hands_of(run.hands)] for run in self.runs]
-        return np.array(hands, dtype=np.int64).reshape(-1, len(self.task.goals))
+        return _fixed(np.array(hands, dtype=np.int64).reshape(-1, len(self.task.goals)))
 
     @cached_property
     def configurations(self) -> Array:
         """Configurations that hit the goals, shape ``(n, G, dof)``, in length units and rad."""
         shape = len(self.runs), len(self.task.goals), self.task.robot.dof
-        return np.array([run.configurations for run in self.runs]).reshape(shape)
+        return _fixed(np.array([run.configurations for run in self.runs]).reshape(shape))
 
     @cached_property
     def starts(self) -> Array:
@@ -98,7 +106,7 @@ class Solutions:
         """
         starts = np.empty_like(self.configurations)
         starts[:, 0], starts[:, 1:] = self.task.q0, self.configurations[:, :-1]
-        return starts
+        return _fixed(starts)
 
     @cached_property
     def against_same_hands(self) -> Array:
@@ -116,7 +124,7 @@ class Solutions:
         for row, run in zip(changes, self.runs, strict=True):
             if (reference := references[run.hands]).completed:
                 row[:] = np.subtract(run.ticks_by_goal(), reference.ticks_by_goal())
-        return changes
+        return _fixed(changes)
 
 
 def initial_solution(task: Task, model: MotionModel = PAPER) -> Execution | None:

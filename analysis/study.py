@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from shlex import quote
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -31,7 +31,6 @@ from coartic.analysis.optima import (
 from coartic.analysis.signatures import SIGNATURES, Solutions
 from coartic.analysis.words import listed, slugs, titled_apart
 from coartic.errors import CoarticError
-from coartic.internal.files import folder_named
 from coartic.internal.text import pluralize, unknown
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.method import Information
@@ -43,7 +42,7 @@ from coartic.robot import Array
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, judge_seed, label_of, reference_seed, size_of, world_title
 from coartic.runs.record import execute_all, judge
-from coartic.runs.shipped import open_results
+from coartic.runs.shipped import SHIPPED, open_results, results_folder
 from coartic.runs.store import explain_errors
 from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
@@ -91,6 +90,40 @@ def typical_run(runs: pd.DataFrame) -> str:
     return str(runs.run_id.iloc[np.abs(values - np.median(values)).argmin()])
 
 
+Value = TypeVar("Value")
+_LAZY = int(pd.__version__.partition(".")[0]) >= 3
+"""True if pandas copies the data of a shallow copy as soon as one of the two frames is changed."""
+
+
+class _Copied(cached_property[Value]):
+    """A cached property that returns a copy, so that a user can change what a study returns."""
+
+    if not TYPE_CHECKING:  # the types of cached_property are right
+
+        def __get__(self, study, owner=None):
+            value = super().__get__(study, owner)
+            return value if study is None else value.copy()
+
+        def __set__(self, study, value):  # without it, Python would not call __get__ again
+            raise AttributeError(f"{self.attrname} cannot be set")
+
+
+class _Frames(Mapping[CellKey, pd.DataFrame]):
+    """A read-only dict of frames, which returns a copy of a frame."""
+
+    def __init__(self, frames: dict[CellKey, pd.DataFrame]) -> None:
+        self._frames = frames
+
+    def __getitem__(self, key: CellKey) -> pd.DataFrame:
+        return self._frames[key].copy(deep=not _LAZY)
+
+    def __iter__(self) -> Iterator[CellKey]:
+        return iter(self._frames)
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+
 Part = Literal["solution", "replay"]
 """Part of a run: its solution, or its replay, which is a trial of a learner after learning, without
 exploration noise."""
@@ -115,7 +148,8 @@ def load(folder: str | Path, *, against: str = "") -> Study:
     Parameters
     ----------
     folder : str or pathlib.Path
-        The folder, or ``"shipped"`` for the shipped results of suite ``comparison``.
+        The folder, or the string ``"shipped"`` for the shipped results of suite ``comparison``. A
+        folder of your own with this name is ``"./shipped"``, or a :class:`pathlib.Path`.
     against : str
         Id, label or title of a method of the folder, with which table ``differences`` compares the
         other methods. By default, :func:`.list_differences` chooses the method.
@@ -138,7 +172,7 @@ def load(folder: str | Path, *, against: str = "") -> Study:
     >>> study = load("results/comparison")  # doctest: +SKIP
     >>> study.runs.groupby("label").gap.mean()  # doctest: +SKIP
     """
-    folder = folder_named(folder)
+    folder = results_folder(folder)
     with open_results(folder) as store:
         plan = store.plan()
         runs = store.runs()
@@ -180,6 +214,8 @@ class Study:
     If the folder contains runs in several worlds, :attr:`worlds` contains a study for each world.
     Attributes and functions that compare runs, such as best known rewards, tables and figures, need
     a study of one world. For a study of several worlds they raise CoarticError.
+
+    Frames and dicts of a study are copies: if you change one, no table or figure changes.
     """
 
     folder: Path
@@ -215,7 +251,7 @@ class Study:
         """Name of the suite that was run."""
         return self.plan[0].suite
 
-    @cached_property
+    @_Copied
     def worlds(self) -> dict[str, Study]:
         """A dict that maps each world of the folder to a study of its runs.
 
@@ -264,7 +300,7 @@ class Study:
             )
         return names[0]
 
-    @cached_property
+    @_Copied
     def models(self) -> dict[str, MotionModel]:
         """A dict that maps the name of each task to the motion model of the world.
 
@@ -289,8 +325,11 @@ class Study:
         The path is relative to the working folder. If the results folder is not inside the working
         folder, the result is only the name of the results folder.
         """
+        if str(self.folder) == SHIPPED:
+            return SHIPPED
         path = Path(os.path.abspath(self.folder))  # without ..
-        return quote(str(path.relative_to(Path.cwd()) if Path.cwd() in path.parents else path.name))
+        name = str(path.relative_to(Path.cwd()) if Path.cwd() in path.parents else path.name)
+        return quote(f"./{name}" if name == SHIPPED else name)
 
     @property
     def question(self) -> tuple[str, str]:
@@ -301,7 +340,7 @@ class Study:
         title, description = self.made_with.get("question", ("", ""))
         return title, description
 
-    @cached_property
+    @_Copied
     def varied(self) -> pd.DataFrame:
         """Values of the parameters that the study varies (:func:`.parameters_varied`).
 
@@ -310,7 +349,7 @@ class Study:
         """
         return parameters_varied(self.runs, self.declared)
 
-    @cached_property
+    @_Copied
     def tasks(self) -> dict[str, Task]:
         """A dict that maps the name of each task to the task, in the order of the plan.
 
@@ -320,12 +359,12 @@ class Study:
         tasks = {job.cell.task.name: job.cell.task for job in self.plan}
         return {task.name: task for task in titled_apart(tasks.values())}
 
-    @cached_property
+    @_Copied
     def declared(self) -> dict[str, MethodInfo]:
         """A dict that maps the id of each method, without a setting, to its declaration."""
         return {job.cell.method.name: job.cell.method for job in self.plan}
 
-    @cached_property
+    @_Copied
     def optima(self) -> dict[str, BestKnown]:
         """A dict that maps the name of each task to its best known reward in the study's world.
 
@@ -389,7 +428,7 @@ class Study:
         hands = ranked.hands.iloc[0] if known else initial_hands(self.tasks[task])
         return alone, hands
 
-    @cached_property
+    @_Copied
     def corrective_best(self) -> dict[str, float]:
         """A dict that maps the name of each task to the reward of the corrective process alone.
 
@@ -438,7 +477,7 @@ class Study:
             by_task[task.name] = dict(zip(numbers, (-means).tolist(), strict=True))
         return by_task
 
-    @cached_property
+    @_Copied
     def runs(self) -> pd.DataFrame:
         """A row for each run: rewards, hand sequences, costs (docs/results.md).
 
@@ -506,7 +545,7 @@ class Study:
         runs.attrs["units"] = UNITS
         return runs
 
-    @cached_property
+    @_Copied
     def methods(self) -> pd.DataFrame:
         """A row for each setting of each method, in the order of lists and figures.
 
@@ -540,20 +579,20 @@ class Study:
         return methods_of(self.runs, self.declared, self.marks)
 
     @cached_property
-    def cells(self) -> dict[CellKey, pd.DataFrame]:
-        """A dict that maps each cell to its runs, including failed runs.
+    def cells(self) -> Mapping[CellKey, pd.DataFrame]:
+        """A mapping from each cell to its runs, including failed runs.
 
         Cells are in the order of the plan. A key is a pair: the name of the task, and the label of
         the method. Raises CoarticError for a study of several worlds.
         """
         check_study(self)
-        runs = self.runs.copy(deep=False)
+        runs = self.runs
         runs.attrs = {}  # pandas would copy attrs with each column
         cells = dict[Any, pd.DataFrame]()
         for key, rows in runs.groupby(["task", "label"], sort=False).indices.items():
             is_slice = rows[-1] - rows[0] < len(rows)  # usual; a slice shares memory with the runs
             cells[key] = runs.iloc[slice(rows[0], rows[-1] + 1) if is_slice else rows]
-        return cells
+        return _Frames(cells)
 
     def sequences(self, task: str) -> pd.DataFrame:
         """Return the reward of the corrective process alone on a task, for each hand sequence.
@@ -575,7 +614,7 @@ class Study:
             - ``reason``: why the trial failed, otherwise empty.
 
             Hand sequences whose trials failed come last. The frame has no rows if the task has more
-            than 4,096 hand sequences. It is cached: do not change it.
+            than 4,096 hand sequences.
 
         Raises
         ------
@@ -593,9 +632,9 @@ class Study:
             ranked = [trial[:3] for trial in ranked_sequences(self.tasks[task], names, model=model)]
             frame = pd.DataFrame(ranked, columns=["hands", "reward", "reason"])
             self._sequences[task] = frame.astype({"reward": "Int64"})
-        return self._sequences[task]
+        return self._sequences[task].copy()
 
-    @cached_property
+    @_Copied
     def solutions(self) -> pd.DataFrame:
         """The stored solutions of all solved runs, with a row for each movement.
 
@@ -644,7 +683,7 @@ class Study:
         -------
         Solutions
             Executions of the first 500 solved runs. If ``replay`` is True, runs without a replay
-            are left out.
+            are left out. The arrays are read-only.
 
         Raises
         ------
@@ -674,6 +713,7 @@ class Study:
                 ticks = sum(movement.ticks or 0 for movement in movements)
                 if not self.is_noisy and run.ticks != ticks:
                     raise ValueError(f"run {run_id} does not reproduce its stored ticks")
+                run.configurations.setflags(write=False)  # the next caller gets the same run
                 executed.append(run)
         solved_runs = Solutions(
             self.tasks[task],
@@ -708,7 +748,7 @@ class Study:
             The study has no runs of the method on the task, or its runs cannot be executed again
             (:meth:`executed`).
         """
-        return self.executed(task, method, replay=replay).configurations
+        return self.executed(task, method, replay=replay).configurations.copy()
 
     def signature(
         self,
@@ -757,7 +797,7 @@ class Study:
                 self._signatures[name, *key, replay] = values
             parts.append(self._signatures[name, *key, replay])
         if len(parts) == 1:
-            return parts[0]
+            return parts[0].copy()
         values_of_all: pd.Series = pd.concat(parts)
         return values_of_all.reindex(self.runs.index)
 
@@ -765,15 +805,14 @@ class Study:
         """Return a dict that maps ids of runs to the stored movements of solutions or replays.
 
         ``part`` is ``"solution"`` or ``"replay"``. Only the first 500 solved runs of each method on
-        each task are included. For ``"replay"``, runs without a replay are left out. The dict is
-        cached: do not change it.
+        each task are included. For ``"replay"``, runs without a replay are left out.
         """
         if part not in self._movements:
             ids = {*self.stored.run_id}
             with open_results(self.folder) as store:
                 stored = store.movements(part, MAX_EXECUTED)
             self._movements[part] = {key: stored[key] for key in stored if key in ids}
-        return self._movements[part]
+        return self._movements[part].copy()
 
     @cached_property
     def _sequences(self) -> dict[str, pd.DataFrame]:
@@ -791,7 +830,7 @@ class Study:
     def _movements(self) -> dict[str, dict[str, tuple[Movement, ...]]]:
         return {}
 
-    @cached_property
+    @_Copied
     def individual_tasks(self) -> dict[str, Task]:
         """A dict that maps names to tasks, for the tasks that a report shows individually.
 
@@ -811,3 +850,17 @@ def ending_of(study: Study) -> str:
     paper's world. Raises CoarticError for a study of several worlds.
     """
     return f"-{slugs([study.world])[study.world]}" if study.world else ""
+
+
+def _stored_of(study: Study) -> pd.DataFrame:
+    """Return a copy of the stored runs."""
+    stored: pd.DataFrame = vars(study)["stored"]
+    return stored.copy()
+
+
+def _set_stored(study: Study, stored: pd.DataFrame) -> None:
+    """Set the stored runs, as the constructor does."""
+    vars(study)["stored"] = stored
+
+
+Study.stored = property(_stored_of, _set_stored)  # type: ignore[assignment]

@@ -26,11 +26,10 @@ from pathlib import Path
 from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.reproduce import compare_runs
 from coartic.errors import CoarticError
-from coartic.internal.files import folder_named
 from coartic.internal.text import pluralize
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, hash_of
-from coartic.runs.shipped import SHIPPED, open_shipped
+from coartic.runs.shipped import SHIPPED, open_shipped, results_folder
 from coartic.runs.store import Store, open_store, open_store_for_writing
 
 
@@ -100,11 +99,11 @@ def include_folders(
         )
     with ExitStack() as stack:
         sources: dict[str, Store] = {}
-        for name in map(str, folders):
+        for folder in map(results_folder, folders):
+            name = str(folder)
             if name == SHIPPED:
                 sources[name] = stack.enter_context(open_shipped(plan[0].suite))
                 continue
-            folder = folder_named(name)
             if folder.resolve() == out.resolve():
                 raise CoarticError(f"{name} cannot include itself: choose another --out")
             if not os.path.lexists(folder):

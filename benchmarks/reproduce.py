@@ -20,7 +20,7 @@ from coartic.method import Meter
 from coartic.pictures.trajectories import Trajectory, trajectory
 from coartic.runs.plan import Job
 from coartic.runs.record import OF_NOISE, PREFIXES, UNREPEATED, Row, judged, too_long
-from coartic.runs.store import open_store
+from coartic.runs.shipped import open_results
 
 
 def find_run(prefix: str, folder: Path) -> Row:
@@ -35,7 +35,7 @@ def find_run(prefix: str, folder: Path) -> Row:
             f"{prefix!r} is not the beginning of a run id, such as 3f2a9c; `coartic list {where}` "
             "lists the ids"
         )
-    with open_store(folder) as store:
+    with open_results(folder) as store:
         ids = sorted(store.ids(prefix))
         if not ids:
             raise CoarticError(
@@ -184,7 +184,7 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
     CoarticError
         No run can be performed here, or the folder cannot be read.
     """
-    with open_store(folder) as store:
+    with open_results(folder) as store:
         plan = store.plan()
         ids = [
             plan[position].run_id(number)
@@ -227,7 +227,7 @@ def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int,
         The folder cannot be read.
     """
     executed, wrong = 0, list[str]()
-    with open_store(folder) as store:
+    with open_results(folder) as store:
         for run_ids in store.judged():
             for run_id in run_ids if every else [random.choice(run_ids)]:
                 stored = store.run(run_id)

@@ -26,12 +26,12 @@ from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.time_left import TimeLeft
 from coartic.errors import CoarticError
-from coartic.internal.files import folder_named
 from coartic.internal.limits import brief_value
 from coartic.internal.text import error_line, pluralize
 from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
 from coartic.runs.record import UNREPEATED, Row, judged
+from coartic.runs.shipped import own_folder
 from coartic.runs.store import Store, open_store_for_writing
 
 _MIN_BATCH = 8
@@ -230,7 +230,7 @@ def perform(
         The repetition of a run differs, other runs of a method were made with other versions of the
         packages that its file imports, or ``watch`` raised an exception.
     """
-    folder, started = folder_named(folder), time.perf_counter()
+    folder, started = own_folder(folder), time.perf_counter()
     watchers = [watch] if watch else []
 
     def tell(cell: Cell | None) -> None:

@@ -21,6 +21,7 @@ from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, described_error, explain
 from coartic.model import WORLD, MotionModel, check_model
 from coartic.robot import Finite
+from coartic.runs.shipped import SHIPPED
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.families import named_by, shipped_families
 from coartic.tasks.task import MAX_NAME_LENGTH, NAME_PATTERN
@@ -181,7 +182,8 @@ def kind_of(name: str) -> str:
         - ``shipped family`` for the name of a shipped family, with or without ``/v1``;
         - ``method file`` for a name that ends in ``.py``;
         - ``suite``, ``family`` or ``task`` for a TOML file, which is recognised by its keys;
-        - ``results folder`` for a folder with results, or a folder that cannot be opened;
+        - ``results folder`` for a folder with results, a folder that cannot be opened, or the word
+          ``shipped``;
         - an empty string for anything else, such as a TOML file that cannot be read.
 
     Examples
@@ -195,6 +197,8 @@ def kind_of(name: str) -> str:
         return "shipped family"
     if name.endswith(".py"):
         return "method file"
+    if name == SHIPPED:
+        return "results folder"
     if not name.endswith(".toml"):
         closed = os.path.isdir(name) and not os.access(name, os.X_OK)
         return "results folder" if closed or os.path.isfile(Path(name) / RUNS_FILE) else ""

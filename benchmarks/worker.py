@@ -213,13 +213,31 @@ def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times)
         outcome = Outcome("infeasible", str(error))
     except BaseException as error:
         _log.debug("Traceback of the run:", exc_info=error)
-        outcome = Outcome("crashed", _place_of(error, method) + error_line(error))
+        reason = _place_of(error, method) + error_line(error) + _limit_met(error)
+        outcome = Outcome("crashed", reason)
     return replace(
         outcome,  # a solution can use the corrective process
         used=tuple(sorted(item.value for item in session.used)),
         meter=session.meter,
         rewards=session.rewards,
         times=times,
+    )
+
+
+def _limit_met(error: BaseException) -> str:
+    """Return words on the limit of the memory of this process, for an error that it may cause.
+
+    NumPy and Python raise MemoryError; other libraries and the system say that they cannot
+    *allocate* memory.
+    """
+    limit, _ = resource.getrlimit(resource.RLIMIT_DATA)
+    if limit == resource.RLIM_INFINITY:
+        return ""
+    if not (isinstance(error, MemoryError) or "allocate" in str(error)):
+        return ""
+    return (
+        f". The limit of a process is {limit / 2**30:.1f} GiB: 80 % of the machine's memory, "
+        "divided by the number of processes; give a smaller --jobs"
     )
 
 

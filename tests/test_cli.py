@@ -1,12 +1,19 @@
 """The command line as a user meets it."""
 
+import hashlib
+import html
 import io
+import json
+import lzma
 import os
 import re
+import shlex
+import shutil
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,12 +23,14 @@ from coartic.analysis.report import build
 from coartic.analysis.study import load
 from coartic.benchmarks import template
 from coartic.benchmarks.registry import registry
+from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import suites
 from coartic.cli import COMMANDS, completion
 from coartic.cli.arguments import resolve_methods
 from coartic.cli.terminal import complain, say, say_pairs
 from coartic.pictures import film
-from coartic.runs.store import lock, open_store
+from coartic.runs import shipped
+from coartic.runs.store import RUNS_FILE, lock, open_store
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.processes import comes, folders_of_session, python
@@ -273,6 +282,68 @@ def test_the_report_of_shipped_results_goes_where_git_ignores_it(coartic, monkey
     assert coartic("report", "shipped")[0] == 0
     assert written == [Path("results/shipped/report")]
     assert "/results/" in (ROOT / ".gitignore").read_text().split()
+
+
+@pytest.fixture
+def shipped_and_own(traced, tmp_path, monkeypatch):
+    """A small folder in place of the shipped results, and a folder of one's own of this name."""
+    place = tmp_path / "package"
+    place.mkdir()
+    content = lzma.compress((traced.folder / RUNS_FILE).read_bytes(), preset=0)
+    (place / "comparison.sqlite.xz").write_bytes(content)
+    digits = hashlib.sha256(content).hexdigest()
+    (place / "SHA256SUMS").write_text(f"{digits}  comparison.sqlite.xz\n")
+    monkeypatch.setattr(shipped, "SHIPPED_FOLDER", place)
+    monkeypatch.chdir(tmp_path)
+    run_and_write(
+        Path("shipped"),
+        [cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])],
+        runs=2,
+        trials=40,
+    )
+    return len(traced.stored), 2
+
+
+def test_the_word_shipped_and_a_folder_of_this_name(coartic, shipped_and_own):
+    of_package, own = shipped_and_own
+    names = {"shipped": of_package, "./shipped": own, "shipped/": own, Path.cwd() / "shipped": own}
+    for name, runs in names.items():
+        assert coartic("list", name)[1].endswith(f"shipped: {runs} runs.\n")
+        assert coartic("verify", name)[1].startswith(f"{runs} runs checked")
+        assert len(load(name).runs) == runs
+        assert ("Natural Computing" in coartic("cite", name)[1]) == (runs == of_package)
+        ids = completion.runs(SimpleNamespace(args=[name]), "")
+        assert len(ids) == runs
+        code, _, error = coartic("draw", name)
+        assert (code, f"`coartic draw {name} --run ID`" in " ".join(error.split())) == (2, True)
+    assert len(load(Path("shipped")).runs) == own
+    code, _, error = coartic(*SMALL, "--out", "shipped")
+    assert (code, "write ./shipped" in " ".join(error.split())) == (2, True)
+    with pytest.raises(CoarticError, match="write ./shipped"):
+        run_suite("paper", "shipped")
+    assert len(load("./shipped").runs) == own
+
+
+@pytest.mark.parametrize("name", ["shipped", "./shipped", "my results/it's 100 %"])
+def test_commands_of_a_page_work(name, coartic, shipped_and_own, in_this_process):
+    """All of them, as the page has them, in the folder in which it was written."""
+    if not name.endswith("shipped"):
+        Path(name).parent.mkdir(exist_ok=True)
+        shutil.move("shipped", name)
+    assert coartic("report", name)[0] == 0
+    page = (Path("results" if name == "shipped" else ""), name, "report", "report.html")
+    text = Path(*page).read_text("utf-8")
+    commands = [*map(html.unescape, re.findall("<code>(coartic [^<]+)</code>", text))]
+    assert {command.split()[1] for command in commands} == {"cite", "draw", "run", "verify"}
+    (run_id,) = load(name).runs.run_id[:1]
+    (player,) = re.findall(r'"folder": ?("(?:[^"\\]|\\.)*")', text)  # for its script
+    commands.append(f"coartic draw {json.loads(player)} --run RUN --out other.gif")
+    for command in commands:
+        words = shlex.split(command.replace("RUN", run_id))[1:]
+        if words != ["run"]:  # the one that made the folder
+            code, said, error = coartic(*words)
+            assert code == 0, (command, error)
+            assert said
 
 
 @pytest.mark.process

@@ -14,7 +14,7 @@ from coartic import CoarticError, load_task
 from coartic.analysis import FIGURES
 from coartic.analysis.figures.drawings import picture_of_tasks
 from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
-from coartic.analysis.methods import KNOWN_METHODS, title_of
+from coartic.analysis.methods import COLORS, KNOWN_METHODS, LOOKS_OF, MARKS, title_of
 from coartic.analysis.optima import BestKnown
 from coartic.internal.threads import environment
 from coartic.pictures import drawing
@@ -91,6 +91,22 @@ def test_no_text_leaves_a_narrow_figure_or_lies_on_another(name, few):
     assert plot.figure.get_figheight() < 4.01
     assert plot.id == name
     assert all(map(len, (plot.alt, plot.caption, plot.data)))
+
+
+@pytest.mark.parametrize("name", ["ranking", "shared-goal", "runtimes", "learning-curves"])
+def test_colour_and_marker_say_which_information_a_method_uses(name, few):
+    """In each figure by the same code; no two groups share a colour or a marker."""
+    colors = {COLORS[color]: group for group, (of, _) in LOOKS_OF.items() for color in of}
+    marks = {MARKS[mark][0]: group for group, (_, of) in LOOKS_OF.items() for mark in of}
+    assert len(colors) == sum(len(of) for of, _ in LOOKS_OF.values())
+    assert len(marks) == sum(len(of) for _, of in LOOKS_OF.values())
+    plot = FIGURES[name](few)
+    drawn = {
+        (colors[line.get_color()], marks[line.get_marker()])
+        for axes in plot.figure.axes for line in axes.lines if line.get_marker() in marks
+    }  # fmt: skip
+    assert drawn == {(group, group) for group in few.methods.information[plot.data.method]}
+    assert name != "learning-curves" or "policy-gradient" in {*plot.data.method}
 
 
 def ends_drawn(figure):

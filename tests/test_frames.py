@@ -10,7 +10,7 @@ import pytest
 
 import coartic
 from coartic import CoarticError
-from coartic.analysis import ecdf, frames
+from coartic.analysis import TABLES, ecdf, frames, load, ranking
 from coartic.analysis.signatures import SIGNATURES
 from tests.support.made_up import row, study_of
 
@@ -159,6 +159,51 @@ def test_runs_are_tidy(traced):
         assert values[~runs.method.str.startswith("dual-process")].isna().all()
 
 
+def test_a_notebook_changes_no_later_table(traced):
+    """Everything that a study returns is changed in place, as far as it can be."""
+    cell = "two-armed-1", "dual-process/EC3"
+    wanted, seen = load(traced.folder), load(traced.folder)
+
+    def shown(study):
+        tables = {name: table(study) for name, table in TABLES.items()}
+        return [tables, ranking(study.runs), study.signature("first"), study.sequences(cell[0]),
+                study.solutions, study.configurations(*cell)]  # fmt: skip
+
+    for _ in range(2):  # before and after the tables are made
+        frames = [seen.stored, seen.runs, seen.methods, seen.solutions, seen.varied,
+                  seen.sequences(cell[0]), seen.cells[cell], *dict(seen.cells).values(),
+                  *(table(seen) for table in TABLES.values())]  # fmt: skip
+        for frame in frames:
+            frame["gap"] = 7.0
+            for name in {"reward", "value", "title", "method"} & {*frame}:
+                frame[name] = frame[name].iloc[::-1].to_numpy()
+            frame.pop(frame.columns[0])
+        for values in (seen.signature("first", *cell), seen.signature("first")):
+            values[:] = 7.0
+        seen.configurations(*cell)[:] = 7.0
+        seen.runs["reward"].array[:] = 7  # which pandas would not copy on write
+        mappings = (seen.tasks, seen.optima, seen.declared, seen.models, seen.worlds,
+                    seen.corrective_best, seen.individual_tasks, seen.movements())  # fmt: skip
+        for mapping in mappings:
+            mapping.clear()
+        executed = seen.executed(*cell)
+        arrays = (executed.hands, executed.configurations, executed.starts,
+                  executed.against_same_hands, executed.runs[0].configurations)  # fmt: skip
+        for array in arrays:
+            with pytest.raises(ValueError, match="read-only"):
+                array[:] = 7.0
+        (tables, *others), (due, *other_due) = shown(seen), shown(wanted)
+        assert len(due["methods"]) > 1
+        for name, table in due.items():
+            pd.testing.assert_frame_equal(tables[name], table)
+        for other, value in zip(others, other_due, strict=True):
+            assert (
+                np.array_equal(other, value)
+                if isinstance(value, np.ndarray)
+                else (other.equals(value))
+            )
+
+
 def planted_scores():
     """Rewards of three methods on three tasks, of which the last leaves nothing to gain."""
     tasks = {"near": (-320, -300), "far": (-600, -500), "nothing": (-40, -40)}
@@ -183,5 +228,14 @@ def test_the_share_of_the_possible_gain_by_hand():
     assert ranked.share_low["middle"] < 0.485 < ranked.share_high["middle"]
     assert ranked.gap["middle"] == pytest.approx((10.5 / 300 + 50.5 / 500 + 3 / 40) / 3, abs=1e-3)
     assert frames.shares(planted)[planted.task == "nothing"].isna().all()
+    # Less than 1 % of the ticks: 2 of 300 (although another task has the same best known reward).
+    for zero, has_share in ((-302, False), (-302.9, False), (-303, True)):
+        little = planted.corrective_best.where(planted.task != "near", zero)
+        little = planted.assign(corrective_best=little)
+        same = planted.assign(task="other", best_known=-300, corrective_best=-400)
+        of_runs = frames.shares(pd.concat([little, same[planted.task == "near"]]))
+        assert of_runs.notna()[: len(planted)][planted.task == "near"].all() == has_share
+        ranked = frames.ranking(little)
+        assert ranked.without_gain.tolist() == [1 + (not has_share)] * 3
     with pytest.raises(CoarticError, match="corrective_best has -290.* above best_known"):
         frames.shares(planted.assign(corrective_best=-290))

@@ -12,7 +12,7 @@ from coartic.analysis.optima import BestKnown
 from coartic.analysis.report.sections import SECTIONS, finding
 from coartic.analysis.tables import is_setting
 from coartic.cli.read import say_ranking
-from tests.support.made_up import runs_of, study_of
+from tests.support.made_up import change_runs, runs_of, study_of
 
 ONE, TWO, THREE = "ascending", "two-armed-1", "two-armed-2"
 BEST = {ONE: -292, TWO: -465, THREE: -306, "descending": -292}
@@ -66,7 +66,7 @@ def test_failed_runs_have_no_signature():
 
 def said(study, capsys):
     """What commands print below the ranking, as one line."""
-    study.runs["commit"] = ""
+    change_runs(study, "commit", "")
     say_ranking(study, Path("out"))
     return " ".join(capsys.readouterr().out.split())
 

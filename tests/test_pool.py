@@ -25,7 +25,7 @@ from tests.support.suites import KNOWN, cell_on, made_once, planned, run_and_wri
 pytestmark = [pytest.mark.process, pytest.mark.usefixtures("not_repeated")]
 
 METHODS = """
-import itertools, multiprocessing, os, signal, subprocess, sys, time
+import itertools, mmap, multiprocessing, os, signal, subprocess, sys, time
 import numpy as np
 from coartic.method import Information, Method, Parameters, Result
 from coartic.motion.solution import Movement
@@ -66,7 +66,9 @@ HANDLED = {
                        "            open(__file__ + '.killed', 'w').close()\n"
                        "            os.kill(os.getpid(), signal.SIGKILL)\n"
                        "        return Result(corrected(session))", "ok", ""),
-    "allocates": ("kept = [np.empty(10**8) for _ in range(10**6)]", "crashed", "MemoryError"),
+    "allocates": ("kept = [np.empty(10**8) for _ in range(10**6)]", "crashed",
+                  "divided by the number of processes; give a smaller --jobs"),
+    "reserves": ("mmap.mmap(-1, 2**50)", "crashed", "give a smaller --jobs"),
     "nothing": ("return None", "solver-failed", "returned NoneType"),
     "nan": ("return Result((Movement(1, 'right', 'planned', session.q0 * np.nan),) * 3)",
             "solver-failed", "NaN in all entries"),

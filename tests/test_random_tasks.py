@@ -10,7 +10,7 @@ from coartic.analysis.methods import EC1, EC2, EC3, EC4, RANDOM_SEARCH
 from coartic.analysis.tables import instance_runs
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
-from tests.support.made_up import MadeUp, made, runs_of, study_of
+from tests.support.made_up import MadeUp, change_runs, made, runs_of, study_of
 
 ONE, TWO = ("one-armed/v1",), ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")
 FEW = (*ONE, "two-armed/v1", "long/v1")
@@ -75,7 +75,8 @@ def test_gaps_have_intervals_in_each_family():
 
 def test_a_method_that_failed_on_an_instance_has_no_gap_in_its_family():
     study = rewarded(RISING, families=TWO)
-    study.runs.loc[(study.runs.task == "long/v1/i002") & (study.runs.label == EC4), "reward"] = None
+    failed = (study.runs.task == "long/v1/i002") & (study.runs.label == EC4)
+    change_runs(study, "reward", None, failed)
     again = MadeUp(study, optima=study.optima)
     table = pd.DataFrame(dict(tables.list_family_gaps.rows(again))).T
     row = table.loc[EC4]

@@ -358,7 +358,7 @@ def test_a_report_of_one_world_with_noise(tmp_path):
     assert study.worlds == {NOISE: study}
     write_report(study, tmp_path / "report", for_paper=False)
     page = (tmp_path / "report" / "report.html").read_text()
-    assert f"in the world {NOISE}." in page
+    assert f"in the world {NOISE}, made with coartic" in page
     assert "Running times are not shown" in page
     table = pd.read_csv(tmp_path / "report" / "tables" / "ranking.csv")
     assert {*table.world} == {NOISE}

@@ -12,16 +12,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from coartic import CoarticError
+from coartic import CoarticError, __version__, load_task
 from coartic.analysis import FIGURES, TABLES, tables
-from coartic.analysis.figures import drawings
+from coartic.analysis.figures import drawings, plot
+from coartic.analysis.figures.plot import picture
 from coartic.analysis.report import build, sections
 from coartic.analysis.report.build import stamp, write_report
 from coartic.analysis.report.sections import SECTIONS, attempt, finding
 from coartic.analysis.study import load
 from coartic.analysis.words import id_of
+from tests.support.made_up import made_up_optima, runs_of, study_of
 from tests.support.processes import ROOT
-from tests.support.suites import cells_of, run_and_write
+from tests.support.suites import cells_of, edit, run_and_write
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +55,28 @@ def test_a_report_is_stamped_with_the_results_of_its_runs(traced, report):
     stamps = [stamp(runs) for runs in (traced.runs, traced.runs[::-1], other)]
     page = (report / "report.html").read_text("utf-8")
     assert [f'name="coartic-runs" content="{each}"' in page for each in stamps] == [1, 1, 0]
+
+
+def test_page_and_citation_name_the_versions_that_made_the_runs(coartic, traced, tmp_path):
+    """And the page the one that draws it, and the one to cite: of the last command."""
+    folder = shutil.copytree(traced.folder, tmp_path / "results")
+    for statement in (
+        "INSERT INTO environments SELECT 'old', json_set(content, '$.coartic', '5.0.0'), '', ''"
+        " FROM environments LIMIT 1",
+        "UPDATE results SET environment = 'old', date = '2020-01-01' WHERE run > 0",
+        "UPDATE environments SET content = json_set(content, '$.coartic', '6.1.0')"
+        " WHERE id != 'old'",
+        "UPDATE suite SET content = json_set(content, '$.coartic', '6.1.0')",
+    ):
+        edit(folder, statement)
+    assert coartic("report", folder)[0] == 0
+    page = html.unescape((folder / "report" / "report.html").read_text("utf-8"))
+    text = " ".join(re.sub("<[^>]+>", "", page).split())
+    assert "made with coartic 5.0.0 and 6.1.0 (" in text
+    assert f" and drawn with {__version__}." in text
+    assert "cite the software (version 6.1.0)" in text
+    note = coartic("cite", folder)[1].partition("Version ")[2].partition("\n")[0]
+    assert re.match("6.1.0(, commit [^;]*)?; runs made with 5.0.0, too", note)
 
 
 def test_each_figure_is_in_a_section():
@@ -96,6 +120,50 @@ def test_text_from_files_is_escaped(traced):
     assert "\\input{x}" not in latex
     assert "5 \\% of \\$x\\_1\\textasciicircum{}2\\$ \\#\\textasciitilde{}" in latex
     assert r"\textbackslash{}input\textbraceleft{}x\textbraceright{}" in latex
+
+
+TITLES = {
+    "ascending": r"50 % of ^a~b\c & #1_x {} {z} $5 to $6 <i>",
+    "two-armed-2": "far } (%) [x] { $x^$ {n} {tasks} {reference}",
+}
+"""Titles of tasks with the signs that Python, HTML, TeX and Matplotlib use."""
+
+
+def test_titles_are_shown_as_they_are_in_headings_and_figures(monkeypatch):
+    tasks = [
+        load_task(name).model_copy(update={"title": title, "provenance": {}})
+        for name, title in TITLES.items()
+    ]
+    own, known = "mine {fast} {n}", "hill-climbing"
+    rewards = {own: [-310, -311, -312, -313, -314], known: [-320, -321, -322, -323, -324]}
+    rows = [
+        row for task in TITLES for name, of in rewards.items() for row in runs_of(task, name, of)
+    ]
+    study = study_of(rows, tasks, optima=made_up_optima(*TITLES))
+    table = TABLES["ranking"]
+    page = tables.html_of(table, study, table(study))
+    heads = {html.unescape(head) for head in re.findall("<th[^>]*>([^<]*)</th>", page)}
+    assert heads >= {f"{title} (%)" for title in TITLES.values()}
+    assert page.count(f">{100 * 20 / 292:.1f}</td>") == 1  # the mean of five runs
+    text = tables.latex_of(table, study, table(study))
+    commands = {"textasciicircum": "^", "textasciitilde": "~", "textbackslash": "\\"}
+    commands |= {"textbraceleft": "{", "textbraceright": "}"}
+    for command, sign in commands.items():
+        text = text.replace(f"\\{command}{{}}", sign)
+    text = re.sub(r"\\([&%$#_])", r"\1", text)  # as TeX prints it
+    for title in TITLES.values():
+        assert f"& {title} (%)" in text
+    pictured = FIGURES["tasks"](study)
+    svg = html.unescape(picture(pictured.figure, ".svg").decode())
+    assert all(title in svg for title in TITLES.values())
+    monkeypatch.setattr(plot, "FIGURES", {})
+    said = " Goal 1 of {far} and {z}."
+
+    def draw_mine(_):
+        return pictured.figure, pd.DataFrame({"runs": [5, 20]}), "", said
+
+    captioned = plot.figure("Mine", "n = {n}, to the {reference}.")(draw_mine)(study)
+    assert captioned.caption == f"n = 5 to 20, to the optimum.{said}"
 
 
 def test_no_text_is_a_formula_of_a_spreadsheet():

@@ -25,7 +25,7 @@ from coartic.analysis.signatures import (
 )
 from coartic.analysis.statistics import exchange_test
 from coartic.robot import HANDS
-from tests.support.made_up import runs_of, study_of_solutions
+from tests.support.made_up import change_runs, runs_of, study_of_solutions
 from tests.support.strategies import AS_RELEASED, changed, posture, tiny_task
 
 
@@ -519,7 +519,7 @@ def test_verdicts_on_postures_at_a_shared_goal(method, difference, runs, verdict
     ]  # fmt: skip
     study = study_of_solutions(cells, deterministic=["plan"])
     of_control = study.runs.method == RANDOM_SEARCH
-    study.runs["trials"] = np.where(of_control, planted["trials"], 10 * (method == EC1))
+    change_runs(study, "trials", np.where(of_control, planted["trials"], 10 * (method == EC1)))
     contexts = shared_goal(study)
     assert contexts.method == method
     rows = TABLES["contexts"](study)

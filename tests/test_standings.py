@@ -22,7 +22,7 @@ from coartic.analysis.statistics import holm, stratified_test
 from coartic.analysis.study import Study
 from coartic.analysis.tables import shown_columns
 from coartic.analysis.words import number
-from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of
+from tests.support.made_up import MadeUp, change_runs, made_up_optima, row, runs_of, study_of
 from tests.support.made_up import study_of_rewards as study
 
 EC1, BOTH = "dual-process/EC1", "dual-process (EC1, EC4)"
@@ -48,7 +48,7 @@ def test_a_method_that_makes_one_trial_does_not_use_its_reward():
     sequence."""
     alone = study({("ascending", "corrective-alone/given"): [-319]} | LEARNER)
     assert alone.methods.information["corrective-alone/given"] == BY_TRIAL  # of ten trials
-    alone.runs.loc[alone.runs.method == "corrective-alone/given", "trials"] = 1
+    change_runs(alone, "trials", 1, alone.runs.method == "corrective-alone/given")
     again = MadeUp(alone, optima=made_up_optima("ascending", "two-armed-1"))
     assert again.methods.information["corrective-alone/given"] == WITHOUT_REWARD
     assert again.methods.information[BOTH] == BY_TRIAL
@@ -72,7 +72,7 @@ def test_a_failed_run_reaches_nothing():
     learner, other = "dual-process/EC1", "posture-based/two-goals"
     rewards = {learner: [-300] * 4, other: [-305, -305, None, None]}
     seen = study({("ascending", method): of for method, of in rewards.items()})
-    seen.runs.loc[seen.runs.reward.isna(), "reason"] = "time limit"
+    change_runs(seen, "reason", "time limit", seen.runs.reward.isna())
     (failed,) = TABLES["failed"](seen).to_dict("records")
     assert (failed["method"], failed["failed"]) == (other, 2)
     assert failed["reasons"] == "2 × time limit"
@@ -193,7 +193,7 @@ def test_methods_are_ranked_and_compared_with_equal_trials(trials, of_command, b
 def test_a_method_of_a_file_that_stops_early_has_a_note():
     seen = with_trials(study(LEARNER | BEST), {})
     assert standings.standings(seen).note["mine"] == ""
-    seen.runs.loc[seen.runs.run.eq(1) & seen.runs.method.eq("mine"), "trials"] = 4
+    change_runs(seen, "trials", 4, seen.runs.run.eq(1) & seen.runs.method.eq("mine"))
     early = MadeUp(seen, optima=seen.optima, rewards=seen.rewards)
     assert standings.standings(early).note["mine"] == "made 4 to 10 of 10 trials"
 
@@ -222,7 +222,7 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     built_in = {("ascending", "hill-climbing"): [-300, None],
                 ("ascending", "corrective-alone/given"): [-319]}  # fmt: skip
     seen = study(TEN | CMA | built_in | {("ascending", "mine"): [-309, -301]})
-    seen.runs.loc[seen.runs.method == "corrective-alone/given", "trials"] = 1
+    change_runs(seen, "trials", 1, seen.runs.method == "corrective-alone/given")
     seen = MadeUp(seen, optima=made_up_optima("ascending", "two-armed-1"))
     rows = TABLES["differences"](seen)
     others = ["cma-es/bandit", "dual-process/EC1"]
@@ -502,7 +502,7 @@ def test_settings_behind_the_corrective_process_are_counted():
         lambda noise, epsilon: (40 if noise > 0.05 else 28 if noise > 0.02 else 20),
         (-4, -3, 0, 3, 4), noise_sd=NOISE, epsilon=EPSILON,
     )  # fmt: skip
-    seen.runs["corrective_best"] = -319.0
+    change_runs(seen, "corrective_best", -319.0)
     *_, last = said(seen)
     assert last == (
         "4 of 6 settings stay behind the corrective process with its best hands, 2 of them within "

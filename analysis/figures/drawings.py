@@ -641,7 +641,7 @@ def draw_runtimes(study: Study) -> Parts | None:
     return drawing, data, alt, (" Means over all tasks." if len(target_ranges(study)) > 1 else "")
 
 
-CURVES = (*LEARNERS, RANDOM_SEARCH, "hill-climbing", "cma-es/bandit")
+CURVES = (*LEARNERS, RANDOM_SEARCH, "hill-climbing", "cma-es/bandit", "policy-gradient")
 """Ids of the built-in methods that have learning curves. Methods from files have learning curves,
 too, if rewards of their trials are stored."""
 

@@ -144,7 +144,8 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
             n = " to ".join(dict.fromkeys(map(number, ends)))
             name = id_of(draw) + ending_of(study)
             heading = f"{title}, in {world_title(study.world)}" if study.world else title
-            return Plot(name, heading, words.format(n=n, reference=to), alt, drawing, data)
+            words = words.replace("{n}", n).replace("{reference}", to)
+            return Plot(name, heading, words, alt, drawing, data)
 
         FIGURES[id_of(draw)] = plot
         return plot

@@ -87,7 +87,7 @@ def look_of(method: str) -> Look:
     --------
     >>> look = look_of("cma-es/bandit")
     >>> look["color"], look["marker"]
-    ('#007c52', '^')
+    ('#5bb8ea', 'o')
     """
     color, mark = LOOKS[method]
     return {"color": COLORS[color], "marker": MARKS[mark][0], "linestyle": MARKS[mark][1]}

@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from coartic import CoarticError
+from coartic import CoarticError, __version__
 from coartic.analysis.figures.drawings import draw_ranking, draw_shared_goal, draw_tasks
 from coartic.analysis.figures.plot import Plot, for_page, panels_for_page, picture
 from coartic.analysis.figures.style import ONE
@@ -37,6 +37,7 @@ from coartic.analysis.words import id_of, listed, marked, number
 from coartic.internal.files import check_inside, describe_os_errors, make_folder, publish
 from coartic.play.page import part_of_page
 from coartic.runs.plan import hash_of, world_title
+from coartic.runs.shipped import open_results
 from coartic.runs.store import lock
 from coartic.tasks.task import shipped_tasks
 
@@ -333,6 +334,8 @@ def _page(
     except PackageNotFoundError:
         links = []
     made_with = study.made_with
+    with open_results(study.folder) as store:
+        versions = store.versions()
     return environment.get_template("page.html.jinja").render(
         title=study.question[0] or _heading_of(study),
         question=study.question[1],
@@ -346,7 +349,9 @@ def _page(
         home=home,
         stamp=stamp(study.stored),
         folder=study.folder_in_commands,
-        version=made_with["coartic"],
+        versions=versions or [made_with["coartic"]],
+        cited=made_with["coartic"],
+        version=__version__,
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
         date=made_with["date"][:10],
         not_ranked=[line for of in study.worlds.values() for line in sections.failed_methods(of)],

@@ -91,8 +91,7 @@ IN_NOISE = (
     "executions of what its method recommends. The same draws of the noise judge all methods and "
     "the corrective process. References are means of 1000 further executions: of a solution that "
     "comes with coartic, or of the best of this folder. A gap can be negative by "
-    "chance. Tasks on which less than 1 % can be "
-    "gained have no share of the gain. Signatures and pictures are of an "
+    "chance. Signatures and pictures are of an "
     "execution without noise. Running times are not shown, because the reward of a single trial is "
     "partly luck."
 )
@@ -180,7 +179,7 @@ Among ranked methods {{ use }}, the smallest gap to the {{ reference }} is {{ ga
         note="The gap is the ticks of the mean reward beyond the {reference}, in per cent of it. "
         "The share of the gain is 0 % for the corrective process alone with its best hands (with "
         "the task's initial hands if there are more than 4096 hand sequences), and 100 % for the "
-        "{reference}; tasks on which both are equal have none. Intervals "
+        "{reference}; tasks on which less than 1 % can be gained have none. Intervals "
         "describe new runs on the same tasks. "
         "Better and worse: the number of tasks on which the mean reward differs significantly from "
         "that of the paper's learner (EC1 with one arm, EC4 with two), by two-tailed tests, "

@@ -18,7 +18,7 @@ import html
 import itertools
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -124,11 +124,10 @@ class Table:
         The ends of intervals are in columns whose names end in ``_low`` and ``_high``, and standard
         deviations in columns whose names end in ``_sd``. Columns ``method`` and ``against`` contain
         labels of methods. If the study has warnings about methods (:attr:`.Study.marks`), column
-        ``note`` contains them. The frame is cached: do not change it. Raises CoarticError for a
-        study of several worlds.
+        ``note`` contains them. Raises CoarticError for a study of several worlds.
         """
         check_study(study)
-        return _frame_of(self, study)
+        return _frame_of(self, study).copy()
 
 
 TABLES: dict[str, Table] = {}
@@ -326,10 +325,13 @@ def shown_columns(
                 continue
             of_number = [name, f"{name}_low", f"{name}_high"] if "[" in column.ending else [name]
             of_number += [f"{name}_sd"] if column.ending == "±" else []
-            rows = frame[of_number].astype(float).to_numpy() * (100.0 if "(%)" in heading else 1.0)
+            in_per_cent = "(%)" in column.heading  # not in the title of a task
+            rows = frame[of_number].astype(float).to_numpy() * (100.0 if in_per_cent else 1.0)
             if column.ending == "±":
                 heading += " ± SD"
-            elif len(of_number) > 1 and not np.isnan(rows[:, 1]).all() and "[" not in heading:
+            elif (
+                len(of_number) > 1 and not np.isnan(rows[:, 1]).all() and "[" not in column.heading
+            ):
                 heading += f" [95{NARROW_SPACE}%]"
             texts = [number_text(column, *row) for row in rows.tolist()]
             shown[name] = ShownColumn(heading, texts, is_number=True)
@@ -350,6 +352,11 @@ def number_text(column: Column, value: float, *spread: float) -> str:
     if len(spread) == 2:
         return f"{text} {in_brackets(*spread, decimals)}".strip()
     return text + "".join(f" ± {number(sd, decimals)}" for sd in spread if not math.isnan(sd))
+
+
+def _unformatted(headings: Iterable[str]) -> list[str]:
+    """Return headings for :meth:`.Styler.relabel_index`, which passes them to ``str.format``."""
+    return [heading.replace("{", "{{").replace("}", "}}") for heading in headings]
 
 
 def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
@@ -385,7 +392,7 @@ def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
         {name: [{"selector": "th", "props": "text-align: left"}]
          for name, kind in kinds.items() if kind}
     )  # fmt: skip
-    headings = [html.escape(column.heading) for column in columns.values()]
+    headings = _unformatted(html.escape(column.heading) for column in columns.values())
     caption = f"<span>{html.escape(caption_of(table, study))}</span>"
     page = styler.relabel_index(headings, axis="columns").set_caption(caption).to_html()
     page = re.sub(r' class="data row\d+ col\d+" ', "", re.sub(r"\n\s+", "\n", page))
@@ -401,7 +408,7 @@ def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[st
     """
     columns = shown_columns(table, study, frame, in_latex=True)
     cells = pd.DataFrame({name: map(latex, column.texts) for name, column in columns.items()})
-    headings = [latex(column.heading) for column in columns.values()]
+    headings = _unformatted(latex(column.heading) for column in columns.values())
     body = (
         cells.style.hide(axis="index")
         .relabel_index(headings, axis="columns")

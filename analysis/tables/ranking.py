@@ -79,9 +79,9 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
     for label, stochastic in study.methods.stochastic.items():
         ahead, tests = list[bool](), list[Estimate]()
         for name, task in study.individual_tasks.items():
-            runs = study.cells.get((name, str(label)))
-            learner = study.cells.get((name, EC4 if len(task.hands) > 1 else EC1))
-            if runs is None or learner is None or runs is learner:
+            learning = EC4 if len(task.hands) > 1 else EC1
+            runs, learner = (study.cells.get((name, each)) for each in (str(label), learning))
+            if runs is None or learner is None or label == learning:
                 continue
             rewards, learned = (solved(cell).value.to_numpy(np.float64) for cell in (runs, learner))
             if len(rewards) == len(runs) and len(learned) == len(learner):

@@ -55,8 +55,18 @@ def option(metavar: str, what: str, *names: str, words: Words | None = None) -> 
     return typer.Option(*names, readable=False, metavar=metavar, help=what, autocompletion=words)
 
 
+def results_folder(name: str) -> Path:
+    """Parse the name of a results folder (:func:`coartic.runs.shipped.results_folder`)."""
+    from coartic.runs import shipped  # is slow
+
+    return shipped.results_folder(name)
+
+
 ResultsFolder = Annotated[
-    Path, typer.Argument(parser=folder_named, metavar="FOLDER", help="Results folder.")
+    Path,
+    typer.Argument(
+        parser=results_folder, metavar="FOLDER", help="Results folder, or the word 'shipped'."
+    ),
 ]
 Out = Annotated[Path | None, file_or_folder("FILE", "File to write.")]
 Replace = Annotated[bool, typer.Option("--replace", help="Replace an existing file.")]

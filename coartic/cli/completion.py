@@ -80,10 +80,10 @@ def runs(ctx: typer.Context, incomplete: str) -> list[str]:
     The runs are all those in the results folder that is named on the command line. The result is
     empty if no folder is named yet. Raises CoarticError if the folder cannot be read.
     """
-    from coartic.runs.store import open_store
+    from coartic.runs.shipped import open_results, results_folder
 
     # The folder is not parsed yet, because the option before the incomplete word lacks its value.
     for folder in ctx.args[:1]:
-        with open_store(Path(folder)) as store:
+        with open_results(results_folder(folder)) as store:
             return store.ids(incomplete)
     return []

@@ -17,7 +17,6 @@ from coartic.cli import arguments as given
 from coartic.cli import completion
 from coartic.cli.terminal import Display, complain, say, say_pairs, say_table
 from coartic.errors import CoarticError
-from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
 from coartic.internal.limits import MAX_RUNS
 from coartic.internal.text import one_line, pluralize
@@ -78,7 +77,7 @@ def report(
         interruptible(lambda: one_line(f"{out} may be incomplete; repeat the command.")),
     ):
         display.show(f"Reading {folder}")
-        study = load(folder, against=against or "")
+        study = load(str(folder), against=against or "")
         differences = map(TABLES["differences"], study.worlds.values())
         if against and not any(map(len, differences)):
             raise CoarticError(
@@ -222,7 +221,8 @@ def verify(
     """
     from coartic.analysis.verify import check_runs
     from coartic.benchmarks.reproduce import execute_with_noise_again
-    from coartic.runs.store import explain_errors, open_store
+    from coartic.runs.shipped import open_results, unpacked
+    from coartic.runs.store import explain_errors
 
     if again and run:
         raise CoarticError("--again has no effect with --run, which performs one run again")
@@ -232,9 +232,10 @@ def verify(
         raise CoarticError("--method-file has no effect without --again or --run")
     is_right = True
     if not run:
-        with Display() as display, open_store(folder), explain_errors(folder):
+        with Display() as display, open_results(folder), explain_errors(folder):
             display.show(f"Executing the solutions of {folder}")
-            report = check_runs(folder)
+            with unpacked(folder) as place:
+                report = check_runs(place)
             executed, wrong = 0, report.wrong
             if not wrong:
                 display.show(f"Executing solutions of {folder} with motor noise")
@@ -275,7 +276,7 @@ def _perform_again(
     """
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_again, find_run, some_runs
-    from coartic.runs.store import open_store
+    from coartic.runs.shipped import open_results
 
     registered = registry(method_file or [])
     if run_ids:
@@ -288,7 +289,7 @@ def _perform_again(
             )
     else:
         runs = some_runs(folder, count, registered)
-        with open_store(folder) as store:
+        with open_results(folder) as store:
             methods = [job.cell.method.name for job in store.plan()]
     given.check_used(method_file, registered, methods)
     for run in runs if run_ids else ():
@@ -346,9 +347,9 @@ def cite(
     folder: Annotated[
         Path | None,
         typer.Argument(
-            parser=folder_named,
+            parser=given.results_folder,
             metavar="FOLDER",
-            help="Results folder; by default all built-in methods.",
+            help="Results folder, or the word 'shipped'; by default all built-in methods.",
         ),
     ] = None,
     analysis: Annotated[
@@ -359,17 +360,23 @@ def cite(
     """Print BibTeX entries of coartic, the paper and the methods."""
     from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
-    from coartic.runs.store import open_store
+    from coartic.runs.shipped import open_results
 
     if folder is None:
         text = bibliography(built_in(), analysis=analysis)
     else:
-        with open_store(folder) as store:
+        with open_results(folder) as store:
             plan, made_with, imports = store.plan(), store.made_with(), store.imports()
+            versions = store.versions()
         declared = {job.cell.method.name: job.cell.method for job in plan}
         worlds = [*dict.fromkeys(job.cell.world for job in plan)]
         text = bibliography(
-            declared, analysis=analysis, environment=made_with, imports=imports, worlds=worlds
+            declared,
+            analysis=analysis,
+            environment=made_with,
+            imports=imports,
+            worlds=worlds,
+            versions=versions,
         )
     say(*text.rstrip("\n").split("\n"))
 
@@ -420,7 +427,7 @@ def draw(
     if run:
         if len(tasks := tasks or []) != 1:
             raise CoarticError("--run needs one results folder: `coartic draw FOLDER --run ID`")
-        film, folder = out or Path("film.gif"), folder_named(tasks[0])
+        film, folder = out or Path("film.gif"), given.results_folder(tasks[0])
         if tasks[0] in builtin_tasks() and not folder.exists():
             raise CoarticError(f"--run needs a results folder; {folder} is a task")
         return _film(folder, run, film, initial, width or 800, replace)
@@ -432,13 +439,13 @@ def draw(
     from coartic.benchmarks.suites import check_kind
     from coartic.internal.files import check_ending, check_output, publish, write_output
     from coartic.runs.plan import tasks_by_name
-    from coartic.runs.store import open_store
+    from coartic.runs.shipped import SHIPPED, open_results
     from coartic.tasks.families import named_by
     from coartic.tasks.task import task_text
 
     for name in tasks or ():
-        if Path(name).is_dir():
-            with open_store(Path(name)):  # explains what another folder lacks
+        if name == SHIPPED or Path(name).is_dir():
+            with open_results(given.results_folder(name)):  # explains what another folder lacks
                 raise CoarticError(
                     f"{name} is a results folder, not a task. `coartic draw {quote(name)} --run "
                     f"ID` films a run, and `coartic list {quote(name)}` lists the ids."

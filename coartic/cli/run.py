@@ -16,7 +16,6 @@ from coartic.cli import completion
 from coartic.cli.read import say_ranking
 from coartic.cli.terminal import Display, say, say_pairs, say_table
 from coartic.errors import CoarticError
-from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
 from coartic.internal.text import one_line, pluralize, unknown
 from coartic.internal.threads import MAX_JOBS
@@ -115,6 +114,7 @@ def run(
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.runner import perform
     from coartic.benchmarks.suites import load_suite, suites
+    from coartic.runs.shipped import own_folder
     from coartic.runs.store import open_store
 
     if suite is None:
@@ -122,7 +122,7 @@ def run(
     if scheduler is not None and jobs is not None:
         raise CoarticError("--jobs has no effect with --scheduler, whose workers perform the runs")
     chosen, display = load_suite(suite), Display()
-    out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
+    out = own_folder(f"results/{chosen.name}" if folder is None else folder, "--out")
 
     def saved() -> str:
         runs_stored = "no run yet"
@@ -157,7 +157,7 @@ def run(
         part = f"`--include {quote(str(out))}`, with all other parts, joins them"
         say_pairs([("Next", f"{out} has runs {runs[0]} to {runs[-1]}: {part}")])
     else:
-        say_ranking(load(out), out)
+        say_ranking(load(str(out)), out)
     if progress.crashed:
         sys.exit(1)
 
@@ -204,7 +204,7 @@ def list_(
     if kind == "suite":
         pairs = _describe_suite(name, load_suite(name))
     elif kind == "results folder":
-        return _list_runs(Path(name))
+        return _list_runs(given.results_folder(name))
     elif kind == "family":
         pairs = _describe_family(load_family(name), name)
     elif name in builtin_tasks() or address_of(name) or ".toml" in name:
@@ -217,7 +217,7 @@ def list_(
             methods = given.resolve_methods([name], registered)
         except CoarticError as error:
             if Path(name).is_dir():
-                return _list_runs(Path(name))  # explains what the folder lacks
+                return _list_runs(given.results_folder(name))  # explains what the folder lacks
             if not str(error).startswith("unknown"):
                 raise
             known = [*suites(), *builtin_tasks(), *families, *registered]
@@ -262,9 +262,9 @@ def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
 
 def _list_runs(folder: Path) -> None:
     """Print a table of the stored runs in the plan of a results folder."""
-    from coartic.runs.store import open_store
+    from coartic.runs.shipped import open_results
 
-    with open_store(folder) as store:
+    with open_results(folder) as store:
         runs = store.runs()
     columns = ["run_id", "task", "method", "setting", "run", "reward", "status"]
     if (runs.world != "").any():

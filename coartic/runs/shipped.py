@@ -8,19 +8,49 @@ from __future__ import annotations
 
 import hashlib
 import lzma
-from contextlib import AbstractContextManager
+import tempfile
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from functools import lru_cache
 from pathlib import Path
 
 import coartic
 from coartic.errors import CoarticError
-from coartic.runs.store import Store, open_content, open_store
+from coartic.internal.files import folder_named
+from coartic.runs.store import RUNS_FILE, Store, open_content, open_store
 
 SHIPPED = "shipped"
 """Name that stands for the shipped results in place of a folder."""
 SHIPPED_FOLDER = Path(coartic.__file__).parent / "benchmarks" / "shipped"
 HASHES = "SHA256SUMS"
 PACKED = ".sqlite.xz"
+
+
+def results_folder(name: str | Path) -> Path:
+    """Return the results folder that a user names, in a command or in Python.
+
+    The string ``shipped`` stands for the shipped results, and the result is then the same word as a
+    path. A folder of this name can be named ``./shipped``, or by a :class:`pathlib.Path`; its path
+    is then absolute, so that it cannot be mistaken. The folder need not exist. Raises CoarticError
+    if the name is empty or blank.
+    """
+    folder = folder_named(name)
+    return folder.absolute() if str(folder) == SHIPPED and name != SHIPPED else folder
+
+
+def own_folder(name: str | Path, what: str = "the name of a folder") -> Path:
+    """Return the results folder that a user names for writing (:func:`results_folder`).
+
+    Raises CoarticError, whose message begins with ``what``, if the name is empty, or if it is the
+    string ``shipped``.
+    """
+    folder_named(name, what)
+    if name == SHIPPED:
+        raise CoarticError(
+            f"{what} is {SHIPPED}, which stands for the results that come with coartic: choose "
+            f"another name, or write ./{SHIPPED}"
+        )
+    return results_folder(name)
 
 
 def open_shipped(suite: str) -> AbstractContextManager[Store]:
@@ -51,12 +81,27 @@ def _decompressed(content: bytes) -> bytes:
 
 
 def open_results(folder: Path) -> AbstractContextManager[Store]:
-    """Open a results folder for reading in a ``with`` block.
+    """Open a results folder (:func:`results_folder`) for reading in a ``with`` block.
 
-    The name ``shipped`` opens the shipped results of the suite ``comparison``. Raises the errors of
+    The word ``shipped`` opens the shipped results of the suite ``comparison``. Raises the errors of
     :func:`.open_store` or :func:`open_shipped`.
     """
     return open_shipped("comparison") if str(folder) == SHIPPED else open_store(folder)
+
+
+@contextmanager
+def unpacked(folder: Path) -> Iterator[Path]:
+    """Return a folder with the file ``runs.sqlite`` of a results folder, in a ``with`` block.
+
+    It is the folder itself; for the shipped results it is a temporary folder.
+    """
+    if str(folder) != SHIPPED:
+        yield folder
+        return
+    with tempfile.TemporaryDirectory() as place:
+        with open_results(folder) as store:
+            Path(place, RUNS_FILE).write_bytes(store.content or b"")
+        yield Path(place)
 
 
 def shipped_hashes() -> dict[str, str]:

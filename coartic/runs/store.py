@@ -117,8 +117,8 @@ class Store:
 
         ``content`` is the content of the file if the database is in memory, otherwise None.
         """
-        self.folder = folder
-        self._db, self._content = connection, content
+        self.folder, self.content = folder, content
+        self._db = connection
 
     # The plan.
 
@@ -288,6 +288,12 @@ class Store:
                 )
         return dict(warnings_by_method)
 
+    def versions(self) -> list[str]:
+        """Return the versions of coartic that made the runs of the plan, the oldest runs first."""
+        query = """SELECT json_extract(environments.content, '$.coartic') FROM asked
+            JOIN environments ON environments.id = environment GROUP BY 1 ORDER BY min(date)"""
+        return [str(version) for (version,) in self._rows(query)]
+
     def imports(self) -> dict[str, list[str]]:
         """Return a dict that maps ids of methods to the packages that their files import.
 
@@ -399,9 +405,9 @@ class Store:
         """
         file = f"{(other.folder / RUNS_FILE).absolute().as_uri()}?mode=ro"
         with explain_errors(other.folder):
-            self._db.execute("ATTACH ? AS other", (":memory:" if other._content else file,))
-            if other._content:
-                self._db.deserialize(other._content, name="other")
+            self._db.execute("ATTACH ? AS other", (":memory:" if other.content else file,))
+            if other.content:
+                self._db.deserialize(other.content, name="other")
         try:
             with self.transaction():
                 for table, condition in (

@@ -39,6 +39,13 @@ class MadeUp(Study):
         vars(self).update(parts)
 
 
+def change_runs(study, name, value, where=slice(None)):
+    """Change a column of the runs that a study stores. ``study.runs`` is a copy."""
+    runs = study.runs
+    runs.loc[where, name] = value
+    vars(study)["runs"] = runs
+
+
 def made(values):
     """Return a method that looks up values by its arguments; those of replays end in ``True``."""
     return lambda *key, replay=False: values[(*key, replay) if replay else key]

@@ -6,6 +6,7 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis import load
+from tests.support.made_up import change_runs
 from tests.support.processes import programs
 from tests.support.suites import KNOWN, InProcess, cell_on, made_once, run_and_write
 
@@ -27,7 +28,7 @@ def study(tmp_path_factory):
         run_and_write(folder, cells, runs=5, trials=150, executor=InProcess())
 
     study = load(made_once(tmp_path_factory, "replication", make))
-    study.runs["trials"] = study.runs.trials.replace(150, 10_000)  # as long as the paper's
+    change_runs(study, "trials", study.runs.trials.replace(150, 10_000))  # as long as the paper's
     return study
 
 
