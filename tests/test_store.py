@@ -302,6 +302,8 @@ def of_5_0_0(path):
         (of_5_0_0, "was written by coartic 5.0.0, .*`coartic run` command with another --out"),
         (foreign, "was not written by coartic"),
         (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it out of"),
+        (lambda path: path.write_bytes(path.read_bytes()[:-1]), "is damaged.*Move it out of"),
+        (lambda path: path.write_bytes(path.read_bytes()[:-4096]), "is damaged.*Move it out of"),
     ],
 )
 def test_what_is_no_results_folder_is_left_alone(copied, tmp_path, spoil, words):

@@ -803,8 +803,8 @@ def _connect(where: str) -> sqlite3.Connection:
 def _has_tables(connection: sqlite3.Connection, path: Path) -> bool:
     """Return whether a file has the tables of coartic; False for an empty file.
 
-    Raises CoarticError for a file that coartic did not write, or whose format this version cannot
-    read.
+    Raises CoarticError for a file that coartic did not write, whose format this version cannot
+    read, or whose end is missing.
     """
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
@@ -826,6 +826,10 @@ def _has_tables(connection: sqlite3.Connection, path: Path) -> bool:
             f"{path} was written by {writer}, in a format that this version cannot read: repeat "
             "the `coartic run` command with another --out"
         )
+    (pages,) = connection.execute("PRAGMA page_count").fetchone()
+    (size,) = connection.execute("PRAGMA page_size").fetchone()
+    if path.stat().st_size < pages * size:  # SQLite would read a last page that is cut as zeros
+        raise CoarticError(f"{plain(str(path))} cannot be used: {_DAMAGED}")
     return True
 
 
