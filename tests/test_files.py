@@ -1,11 +1,15 @@
 """Files for users: written whole, and never over what is not ours."""
 
 import os
+from functools import partial
 
 import pytest
 
 from coartic import CoarticError
-from coartic.internal.files import LISTING, make_folder, publish, write_atomically, write_output
+from coartic.internal import files
+from coartic.internal.files import LISTING, make_folder, write_atomically, write_output
+
+publish = partial(files.publish, ours=".*")
 
 
 def content(folder):
@@ -48,6 +52,18 @@ def test_a_listing_that_leads_elsewhere_is_refused(tmp_path):
         with pytest.raises(CoarticError, match="leads out of"):
             publish(tmp_path / "report", {"a.txt": b"1"})
     assert (tmp_path / ".coartic-9-mine").read_text() == "mine"
+
+
+def test_a_list_of_somebody_else_removes_no_file_with_another_name(tmp_path):
+    """Their list names files that a user has put there: nothing of these can be made again."""
+    for name in ("mine.txt", "notes/mine.csv", "old.csv"):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("mine")
+    (tmp_path / LISTING).write_text("mine.txt\nnotes/mine.csv\nold.csv\n")
+    files.publish(tmp_path, {"a.csv": b"1"}, r"[a-z]+\.csv")
+    assert {*content(tmp_path)} == {"a.csv", "mine.txt", "notes/mine.csv"}
+    assert (tmp_path / LISTING).read_text() == "a.csv\n"
 
 
 @pytest.mark.parametrize("listing", [None, b"", b"a.txt\n\0\0\0\0", b"\0" * 4096, b"\x1b\xff\xfe"])

@@ -21,6 +21,7 @@ from coartic.analysis.report.build import stamp, write_report
 from coartic.analysis.report.sections import SECTIONS, attempt, finding
 from coartic.analysis.study import load
 from coartic.analysis.words import id_of
+from coartic.internal.files import LISTING
 from tests.support.made_up import made_up_optima, runs_of, study_of
 from tests.support.processes import ROOT
 from tests.support.suites import cells_of, edit, run_and_write
@@ -181,6 +182,25 @@ def test_a_report_is_not_written_through_a_link(traced, tmp_path):
     with pytest.raises(CoarticError, match="by a symbolic link"):
         write_report(study, study.folder / "report")
     assert not list((tmp_path / "mine").iterdir())
+
+
+def test_a_report_removes_only_files_that_it_can_write(traced, tmp_path, monkeypatch):
+    """Of an earlier report with figures, whose list somebody has extended by files of a user."""
+    folder = tmp_path / "report"
+    drawn = {f"figures/{name}": b"drawn" for name in ("ranking.svg", "runtimes-motor-noise-0.pdf")}
+    monkeypatch.setattr(build, "_files_of_figures", lambda *_: drawn)
+    assert build.write_report(traced, folder)[1] == {}
+    earlier = {path.relative_to(folder).as_posix() for path in folder.rglob("*.*")}
+    earlier.remove(LISTING)
+    users = {"mine.txt", "tables/mine.csv", "figures/mine.svg", "figures/ranking.txt"}
+    for name in users:
+        (folder / name).write_text("mine")
+    with (folder / LISTING).open("a") as listing:
+        listing.write("".join(f"{name}\n" for name in users))
+    build.write_report(traced, folder, for_paper=False)
+    left = {path.relative_to(folder).as_posix() for path in folder.rglob("*.*")} - {LISTING}
+    pages = {name for name in earlier if name.endswith((".html", ".csv"))}
+    assert left == pages | users
 
 
 def test_a_page_stands_alone(report):

@@ -15,7 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic import CoarticError, __version__
 from coartic.analysis.figures.drawings import draw_ranking, draw_shared_goal, draw_tasks
-from coartic.analysis.figures.plot import Plot, for_page, panels_for_page, picture
+from coartic.analysis.figures.plot import FIGURES, Plot, for_page, panels_for_page, picture
 from coartic.analysis.figures.style import ONE
 from coartic.analysis.report import sections
 from coartic.analysis.report.player import player
@@ -150,8 +150,15 @@ def write_report(
             files[f"tables/{name}.csv"] = csv_of_worlds(of_worlds).encode()
         files |= {f"tables/{name}.tex": "\n".join(of).encode() for name, of in texts.items() if of}
         files["report.html"] = _page(study, home, shown, first, failures).encode()
-        publish(folder, files)
+        publish(folder, files, _names_of_files())
         return list(files), failures
+
+
+def _names_of_files() -> str:
+    """Return a regular expression of the paths of all files that a report can have."""
+    tables, figures = "|".join(TABLES), "|".join(FIGURES)
+    of_figures = rf"figures/({figures})(-[a-z0-9-]+)?\.(svg|pdf)"
+    return rf"report\.html|tables/({tables})\.(csv|tex)|{of_figures}"
 
 
 def _latex_of(study: Study, table: Table) -> str:

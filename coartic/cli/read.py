@@ -470,7 +470,7 @@ def draw(
     else:
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
         files |= {"tasks.svg": picture(drawing, ".svg")}
-        publish(out, files)
+        publish(out, files, r"[^/]+\.toml|tasks\.svg")
     drawn = f"; the first {_PICTURED} are drawn" if len(chosen) > _PICTURED else ""
     return say(f"{out}: {pluralize(len(chosen), 'task')}{drawn}.")
 

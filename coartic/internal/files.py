@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
@@ -34,11 +35,12 @@ def write_atomically(path: Path, data: bytes) -> None:
         part.unlink(missing_ok=True)
 
 
-def publish(folder: Path, files: Mapping[str, bytes]) -> None:
+def publish(folder: Path, files: Mapping[str, bytes], ours: str) -> None:
     """Write files into a folder, in place of the files of earlier calls.
 
     Files of earlier calls that are not in ``files`` are removed; so is the subfolder of a removed
-    file, if it is empty then. Files that :data:`LISTING` does not list are not changed.
+    file, if it is empty then. Files that :data:`LISTING` does not list are not changed, and files
+    whose names the caller never writes are not removed: the list may be somebody else's.
 
     Parameters
     ----------
@@ -46,6 +48,8 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
         Folder to write into. A missing folder is made.
     files : mapping of str to bytes
         Dict that maps the path of each file, relative to the folder, to its content.
+    ours : str
+        Regular expression of all paths that the caller can write.
 
     Raises
     ------
@@ -66,7 +70,7 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
         list_files({*old_files, *files})  # so that an interrupted call leaves no unknown file
         for name, data in files.items():
             write_atomically(folder / name, data)
-        for name in old_files - {*files}:
+        for name in {name for name in old_files - {*files} if re.fullmatch(ours, name)}:
             (folder / name).unlink(missing_ok=True)
             with contextlib.suppress(OSError):  # the folder has other files
                 (folder / name).parent.rmdir()
