@@ -30,6 +30,7 @@ Acquisition*):
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import math
 import sqlite3
@@ -45,6 +46,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+BLOCK = 2**16  # points of a movement that are in memory at the same time
 STATED = {  # columns of table results that describe each part of a run
     "solution": ("reward", "hands", "solution_corrections", "other_arm_travel"),
     "initial": ("initial_reward", "initial_hands"),
@@ -136,37 +138,41 @@ def scaled(changes: Floats, model: Any) -> Floats:
     return sizes
 
 
-def straight_path_points(q: Floats, target: Floats, model: Any) -> Floats:
+def straight_path_points(
+    q: Floats, target: Floats, model: Any, part: slice = slice(None)
+) -> Floats:
     """Return the points of a straight movement from ``q`` to a target, shape ``(dof, points)``.
 
     The points are spaced by ``model.step`` in joint space; the last step can be shorter. A
-    coordinate whose entry in the target is NaN does not move.
+    coordinate whose entry in the target is NaN does not move. ``part`` selects points.
     """
     target = np.where(np.isnan(target), q, target)
     difference = target - q
     sizes = scaled(difference, model)
     is_euclidean = model.norm == "euclidean"
     distance = math.sqrt(np.cumsum(sizes * sizes)[-1]) if is_euclidean else sizes.max()
-    fractions = np.arange(math.ceil(distance / model.step) + 1) * model.step / (distance or 1.0)
+    last = math.ceil(distance / model.step)
+    numbers = np.arange(last + 1)[part]
+    fractions = numbers * model.step / (distance or 1.0)
     points: Floats = q[:, None] + fractions * difference[:, None]
-    points[:, -1] = target
+    points[:, numbers == last] = target[:, None]
     return points
 
 
-def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
+def path(q: Floats, waypoints: Floats, model: Any, part: slice = slice(None)) -> Floats:
     """Return the points of a path from ``q`` through waypoints, shape ``(dof, points)``.
 
     ``waypoints`` has shape ``(W, dof)``. The points are spaced by ``model.step`` along the path;
-    the last point is the last waypoint, and the step to it can be shorter.
+    the last point is the last waypoint, and the step to it can be shorter. ``part`` selects points.
     """
     corners = np.array([q, *waypoints])
     sizes = scaled(np.diff(corners, axis=0), model)
     is_euclidean = model.norm == "euclidean"
     lengths = np.sqrt((sizes**2).sum(axis=1)) if is_euclidean else sizes.max(axis=1)
     ends = np.append(0.0, np.cumsum(lengths))
-    along = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])
+    along = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])[part]
     points = np.array([np.interp(along, ends, joint) for joint in corners.T])
-    points[:, -1] = corners[-1]
+    points[:, along == ends[-1]] = corners[-1][:, None]
     return points
 
 
@@ -178,18 +184,27 @@ def make(
     ``corners`` has shape ``(rows, dof)``. For a path, its rows are the waypoints; for any other
     movement, its only row is the target. ``goal`` is the number of the goal, from 1.
     """
-    model, is_path = task.model, kind == "path"
-    points = path(q, corners, model) if is_path else straight_path_points(q, corners[-1], model)
-    x, y = hand_at(points, task.arms[hand])
-    dx, dy = task.goals[goal - 1][0] - x, task.goals[goal - 1][1] - y
-    hits = np.sqrt(dx * dx + dy * dy) <= task.radius
-    stops = hits.copy()
-    if kind in ("learned", "planned"):
-        dx, dy = x[-1] - x, y[-1] - y
-        stops |= np.sqrt(dx * dx + dy * dy) <= model.arrival_tolerance
-    stops[-1] = True
+    model, arm = task.model, task.arms[hand]
+    end_x, end_y = hand_at(np.where(np.isnan(corners[-1]), q, corners[-1])[:, None], arm)
+    for begin in itertools.count(0, BLOCK):  # all points would need much memory if the base is dear
+        part = slice(begin, begin + BLOCK + 1)  # one more, so that no part is empty
+        if kind == "path":
+            points = path(q, corners, model, part)
+        else:
+            points = straight_path_points(q, corners[-1], model, part)
+        x, y = hand_at(points, arm)
+        dx, dy = task.goals[goal - 1][0] - x, task.goals[goal - 1][1] - y
+        hits = np.sqrt(dx * dx + dy * dy) <= task.radius
+        stops = hits.copy()
+        if kind in ("learned", "planned"):
+            dx, dy = end_x - x, end_y - y
+            stops |= np.sqrt(dx * dx + dy * dy) <= model.arrival_tolerance
+        if points.shape[1] <= BLOCK:
+            stops[-1] = True
+        if stops.any():
+            break
     k = int(np.argmax(stops))  # the first point at which the movement stops
-    return points[:, k], k + 1, bool(hits[k])
+    return points[:, k], begin + k + 1, bool(hits[k])
 
 
 def _recompute(task: Any, movements: list[list[Any]]) -> tuple[Any, ...]:

@@ -122,7 +122,7 @@ _BOUNDS = {
     "correction_tolerance": (1e-6, 1e6),
     "max_iterations": (0, 10**9),
     "motor_noise": (0.0, 100.0),
-    "base_weight": (1e-6, 1e6),
+    "base_weight": (1e-6, 1e3),  # the base then takes 100,000 ticks for a length unit
 }
 
 

@@ -1,5 +1,6 @@
 """Executing and scoring solutions, whoever made them."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +29,16 @@ def test_no_way_is_followed_without_end():
     first, second = execute_all(task, [out, back])
     assert first.reward == -192  # on the way
     assert "1800000 steps; at most 1000000 are allowed" in str(second)
+
+
+def test_corrective_movements_count_in_the_limit_of_steps():
+    """In this world a length unit of the base takes 100,000 ticks."""
+    far = tiny_task().model_copy(update={"goals": ((15.0, 1.0), (-15.0, 2.0))})
+    solution = [Movement(goal, "right", "corrective") for goal in (1, 2)]
+    (short,) = execute_all(far, [solution])
+    assert short.completed
+    (long,) = execute_all(far, [solution], PAPER._replace(base_weight=1e3))
+    assert re.search("takes [0-9]{7} ticks; at most 1000000 are allowed", str(long))
 
 
 def planned(*targets, hand="right"):

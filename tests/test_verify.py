@@ -152,7 +152,7 @@ def test_the_program_says_what_it_found(true_folder, tmp_path, capsys, monkeypat
 def test_it_stands_on_its_own():
     """A quarter of an hour's reading, and nothing of the project that it judges."""
     text = Path(checker.__file__).read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 320
+    assert len(text.splitlines()) <= 335
     roots = set(re.findall(r"^ *(?:import|from) (\w+)", text, re.MULTILINE))
     assert roots <= {"numpy", *sys.stdlib_module_names}
 
@@ -167,8 +167,9 @@ def test_it_stands_on_its_own():
     scale=st.sampled_from([1e-3, 0.1, 1.0, 9e3]),
     step=st.sampled_from([0.01, 0.037]),
     world=st.sampled_from(WORLDS),
+    block=st.sampled_from([1, 3, 2**16]),
 )
-def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step, world):
+def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step, world, block):
     """Exactly, with a goal whose rim runs through a point of the movement, or a bit beside it; also
     where there is no way to go."""
     robot, on_path = task.robot, kind == "path"
@@ -195,7 +196,9 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step,
         stops = kind == "learned"
         due = move(robot, q, target, hand, goal, judge.radius, stop_on_arrival=stops, model=model)
     corners = np.array([middle, target][not on_path :])
-    stopped, *rest = checker.make(judge, q, 1, hand, kind, corners)
+    with pytest.MonkeyPatch.context() as patch:  # also if a movement is made in parts
+        patch.setattr(checker, "BLOCK", max(block, len(points.T) // 50))
+        stopped, *rest = checker.make(judge, q, 1, hand, kind, corners)
     assert ([*stopped], *rest) == ([*due.q], due.ticks, due.hit)
 
 

@@ -128,6 +128,7 @@ def test_ids_are_those_of_the_paper_unless_the_world_is_another():
         ("{ motor_noise = -0.1 }", "model.motor_noise is -0.1"),
         ('{ norm = "taxi" }', "model.norm is 'taxi'; it must be 'euclidean' or 'maximum'"),
         ("{ base_weight = 0.0 }", "model.base_weight is 0.0"),
+        ("{ base_weight = 1001 }", "model.base_weight is 1001; it must be .* to 1000"),
         ("{}", "model is {}; it must be a table of constants"),
         ('"noisy"', "model is 'noisy'; it must be a table"),
         ("{ motor_noise = [] }", "model.motor_noise is empty"),

@@ -414,14 +414,23 @@ def execute_all(
     -------
     list of Execution or Exception
         Execution of each solution, in the order of ``solutions``. For a solution that breaks the
-        rules of the task or is too long (:func:`too_long`), the entry is an exception, which is not
-        raised.
+        rules of the task, is too long (:func:`too_long`), or takes more than 1,000,000 ticks, the
+        entry is an exception, which is not raised.
     """
     exact = model.without_noise()
     errors = [too_long(task, solution, exact) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
-    executions = iter(execute_many(compiled_task(task, exact), short))
+    executions = map(_unless_long, execute_many(compiled_task(task, exact), short))
     return [next(executions) if error is None else error for error in errors]
+
+
+def _unless_long(execution: Execution | Exception) -> Execution | Exception:
+    """Return an execution, or an error if its corrective movements make it too long."""
+    if isinstance(execution, Execution) and execution.ticks > MAX_STEPS:
+        return SolutionError(
+            f"the solution takes {execution.ticks} ticks; at most {MAX_STEPS} are allowed"
+        )
+    return execution
 
 
 def judge(
