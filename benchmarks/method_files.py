@@ -117,7 +117,10 @@ def _ask(reader: Any, shown: str, function: Any, *arguments: Any) -> Any:
     except TimeoutError:
         raise CoarticError(f"{shown}: its process did not answer within {_ANSWER_S:g} s") from None
     except (BrokenExecutor, OSError, RuntimeError) as error:
-        reason = error_line(error.__cause__ or error)
+        cause = error.__cause__ or error
+        reason = error_line(cause)
+        if isinstance(cause, EOFError | ConnectionError):
+            reason = "the server of processes was ended, perhaps because memory ran out"
         raise CoarticError(
             f"{shown}: a process to read it cannot start ({reason}). Repeat the command"
         ) from None

@@ -320,6 +320,14 @@ def test_what_is_no_results_folder_is_left_alone(copied, tmp_path, spoil, words)
         assert content() == before
 
 
+def test_a_file_without_its_views_is_damaged(copied, tmp_path):
+    """As a dump that was restored in part."""
+    edit(tmp_path, "DROP VIEW asked")
+    for use in (load, perform_here):
+        with pytest.raises(CoarticError, match="it is damaged. Move it out of"):
+            use(tmp_path)
+
+
 @pytest.mark.parametrize(
     "statement",
     ["VACUUM", "CREATE VIEW mine AS SELECT 1"],
@@ -354,6 +362,9 @@ def rewritten(*place):
     return change
 
 
+DEEP = "[" * 100_000 + "]" * 100_000
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -361,6 +372,10 @@ def rewritten(*place):
         "suite SET content = 'x'",
         "results SET movements = '{'",
         "results SET rewards = substr(rewards, 1, 9)",
+        "cells SET method = 'x'",
+        "cells SET task = 'descending'",
+        f"cells SET content = '{DEEP}'",
+        f"results SET movements = '{DEEP}'",
         rewritten(4, 6, 0.1),
         rewritten(2, "path"),
     ],

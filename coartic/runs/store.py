@@ -190,12 +190,14 @@ class Store:
         """
         made_with = self.made_with()
         limits = made_with.get("time_limit_s"), made_with.get("trials")
-        query = """SELECT cells.id, cells.content, seed, runs, name FROM suite
+        query = """SELECT cells.id, cells.content, task, method, seed, runs, name FROM suite
             JOIN cells ON runs IS NOT NULL ORDER BY position"""
         plan, known = list[Job](), dict[str, Any]()
         with explain_errors(self.folder):
-            for cell_id, content, seed, runs, suite in self._rows(query):
+            for cell_id, content, task, method, seed, runs, suite in self._rows(query):
                 cell = _cell_from(cell_id, content, known)
+                if (task, method) != (cell.task.name, cell.method.name):
+                    raise ValueError(f"{method} on {task} has another name in its cell")
                 plan.append(Job(cell, seed, range(runs), limits[0], suite, limits[1]))
         if not plan:
             raise CoarticError(f"the plan of {self.folder} is empty: {_RESUME}")
@@ -856,18 +858,24 @@ def _add_columns(connection: sqlite3.Connection) -> None:
     )
 
 
+_UNREADABLE = (
+    *(OSError, sqlite3.Error, zlib.error, ValueError, LookupError, TypeError),
+    *(ArithmeticError, RecursionError),
+)
+
+
 @contextmanager
 def explain_errors(folder: Path) -> Iterator[None]:
     """Turn errors of a ``with`` block into a CoarticError that names the file.
 
     - For an OSError or an error of SQLite, the message says what the cause is.
-    - For a ValueError, LookupError, TypeError or error of zlib, the message says that coartic did
-      not write the content.
+    - For a ValueError, LookupError, TypeError, ArithmeticError, RecursionError or error of zlib,
+      the message says that coartic did not write the content.
     - Other errors are raised as they are.
     """
     try:
         yield
-    except (OSError, sqlite3.Error, zlib.error, ValueError, LookupError, TypeError) as error:
+    except _UNREADABLE as error:
         raise CoarticError(_explain(folder / RUNS_FILE, error)) from None
 
 
@@ -903,7 +911,7 @@ def _explain(path: Path, error: Exception) -> str:
         name = getattr(error, "sqlite_errorname", "")
         problem = _SENTENCES.get(name, _SENTENCES.get("_".join(name.split("_")[:2]), problem))
         # The file was cut off while it was open.
-        if "decode to UTF-8" in problem or problem.startswith("no such table"):
+        if "decode to UTF-8" in problem or problem.startswith("no such "):
             problem = _DAMAGED
     else:
         wrong = explain(error) if isinstance(error, ValidationError) else problem
