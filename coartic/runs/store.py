@@ -478,7 +478,9 @@ class Store:
         there = {*self._columns("asked")}
         missing = {"world": "'' AS world"}
         columns = [
-            _NOISY.get(name, f'"{name}"') if name in there else missing.get(name, f"NULL AS {name}")
+            _NOISY.get(name, f'"{name}"')
+            if name in there
+            else missing.get(name, f'NULL AS "{name}"')
             for name, *_ in COLUMNS
         ]
         return self._frame(f"SELECT {', '.join(columns)} FROM asked ORDER BY position, run")
