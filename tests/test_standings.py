@@ -103,6 +103,7 @@ def test_better_and_worse_are_of_one_methods_tests():
     rows = TABLES["ranking"](seen)[["better", "worse"]]
     assert rows.loc["mine"].tolist() == [2, 0]
     assert rows.loc["unsure"].tolist() == [0, 0]  # half a tick better on both tasks
+    assert rows.loc[BOTH].isna().all()  # the learner is not compared with itself
 
 
 @pytest.mark.parametrize("runs", [6, 10])
