@@ -215,9 +215,8 @@ def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -
         row = study.methods.loc[method]
         values = study.varied.loc[method].items()
         words = describe_values({str(name): value for name, value in values})
-        words += (
-            f", {default_name(str(row.method_id))}" if not row.setting else ""
-        ) + MARK * row.title.endswith(MARK)
+        words += "" if row.setting else f", {default_name(str(row.method_id))}"
+        words += MARK if row.title.endswith(MARK) else ""
         return "\n".join(
             textwrap.wrap(words, _MAX_NAME_LENGTH // 2 if style.is_narrow() else longest)
         )

@@ -303,17 +303,18 @@ def section_of_world(study: Study) -> Section:
 
     ``study`` is the study of this world.
     """
+    note = (
+        "Methods practised and were judged in this world, and are only compared with each other. "
+        "Gaps are to the {reference} in this world, and the share of the gain is 0 % for the "
+        "corrective process with its best hands in this world. "
+    )
     return replace(
         SECTIONS[0],
         id=f"world{ending_of(study)}",
         title=capital(world_title(study.world)),
         tables=(*SECTIONS[0].tables, list_methods, list_failed),
         figures=(draw_ranking, draw_learning_curves),
-        note="Methods practised and were judged in this world, and are only compared with each "
-        "other. Gaps are to the {reference} in this world, and the share of the gain is 0 % for "
-        "the corrective process with its best hands in this world. "
-        + f"{IN_NOISE} {NEEDS_RUNS}"
-        * study.is_noisy,
+        note=f"{note}{IN_NOISE} {NEEDS_RUNS}" if study.is_noisy else note,
     )
 
 

@@ -131,10 +131,11 @@ def _effect_of(study: Study, parameter: str) -> str:
         return f"{shown}{f', and {at_best}' if at_best else ''})."
     change = f"the gap by {apart}{on_average}{f', and by {at_best}' if at_best else ''}"
     labels = [label for value in compared for label in value.labels]
-    few = not is_tested and has_few_runs(study, labels, ranked_tasks(study))
+    is_few = not is_tested and has_few_runs(study, labels, ranked_tasks(study))
+    few = TOO_FEW if is_few else ""
     least = f"it is smallest at {rows.value.iloc[int(rows.gap.argmin())]}"
     least += f", which cannot be told apart from {listed(alike)}" if alike else ""
-    return f"{subject} changes {change}{TOO_FEW * few}; {least}."
+    return f"{subject} changes {change}{few}; {least}."
 
 
 def _settings_behind(study: Study, rows: pd.DataFrame) -> str:

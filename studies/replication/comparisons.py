@@ -73,7 +73,7 @@ def all_higher(comparisons, shown=()):
             if second.numbers.ndim:
                 difference = difference_of_means(first.numbers, second.numbers)
                 words += f", a difference of {written(difference, 1 if first.in_ticks else 3)}"
-                words += " ticks" * first.in_ticks
+                words += " ticks" if first.in_ticks else ""
             if first.published and second.published:
                 words += f"; published {said(first.published)} and {said(second.published)}"
         parts.append((first.quantity, words))
