@@ -63,7 +63,7 @@ def test_a_list_of_somebody_else_removes_no_file_with_another_name(tmp_path):
     (tmp_path / LISTING).write_text("mine.txt\nnotes/mine.csv\nold.csv\n")
     files.publish(tmp_path, {"a.csv": b"1"}, r"[a-z]+\.csv")
     assert {*content(tmp_path)} == {"a.csv", "mine.txt", "notes/mine.csv"}
-    assert (tmp_path / LISTING).read_text() == "a.csv\n"
+    assert (tmp_path / LISTING).read_text() == "a.csv\nmine.txt\nnotes/mine.csv\n"
 
 
 @pytest.mark.parametrize("listing", [None, b"", b"a.txt\n\0\0\0\0", b"\0" * 4096, b"\x1b\xff\xfe"])

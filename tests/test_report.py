@@ -86,13 +86,13 @@ def test_each_figure_is_in_a_section():
 
 
 def test_a_value_without_a_column_and_a_column_without_a_value_are_errors(traced, monkeypatch):
-    monkeypatch.setattr(tables, "TABLES", {})
+    monkeypatch.setattr(tables.language, "TABLES", {})
 
     def list_mine(study):
         yield "a row", {"method": "mine", "gpa": 1.0, "run_ids": ""}
 
     for columns, wrong in (("method|m\ngap|g", "'gap', 'gpa'"), ("method|m", "'gpa'")):
-        with pytest.raises(KeyError, match=f"table mine: .*{wrong}"):
+        with pytest.raises(ValueError, match=rf"table mine \(.*, line \d+\): .*{wrong}"):
             tables.table("Mine", columns)(list_mine)(traced)
     right = tables.table("Mine", "method | m\ngpa | grade (%) | 1 | tex")(list_mine)
     frame = right(traced)
@@ -345,14 +345,20 @@ def test_a_file_adds_tables_and_figures(traced, tmp_path, coartic):
         ("x = 1\n", "own.py makes no table and no figure: use @table or @figure"),
         ("x = 1\n1 / 0\n", "own.py, line 2: ZeroDivisionError: division by zero"),
         ("def (\n", "own.py, line 1: SyntaxError: invalid syntax"),
+        ("import sys\nsys.exit(3)\n", "own.py, line 2: SystemExit: 3"),
+        ("import json\njson.loads('{')\n", "own.py, line 2: JSONDecodeError"),
         ("from coartic.analysis import table\n@table('x', 'a')\ndef list_ranking(study): ...\n",
-         "the id 'ranking' is taken"),
+         "own.py, line 2: id 'ranking' exists already; rename function list_ranking"),
+        ("from coartic.analysis import table\n@table('x', 'a')\ndef mine(study): ...\n",
+         "own.py, line 2: function mine must be named list_NAME or draw_NAME"),
     ],
 )  # fmt: skip
 def test_a_file_that_adds_nothing_is_refused_before_anything_is_written(
-    traced, tmp_path, coartic, text, words
+    traced, tmp_path, coartic, text, words, monkeypatch
 ):
-    file = tmp_path / "no.py" if text is None else own_file(tmp_path, text)
+    """Also a file that is named by a path from the current folder, as most are."""
+    monkeypatch.chdir(tmp_path)
+    file = "no.py" if text is None else own_file(tmp_path, text).name
     code, _, error = coartic("report", traced.folder, "--out", tmp_path / "r", "--with", file)
     assert (code, words in error) == (2, True), error
     assert not (tmp_path / "r").exists()
@@ -369,5 +375,27 @@ def list_wrong(study):
     code, _, error = coartic("report", traced.folder, "--out", tmp_path / "r", "--with", file)
     assert code == 1
     assert "Own tables and figures could not be made: " in error
+    assert "table wrong (own.py, line 2): the rows and the columns must have the same" in error
     assert "only one of them has ['a', 'b']" in error
     assert (tmp_path / "r" / "tables" / "ranking.csv").is_file()
+
+
+def test_an_error_in_a_library_names_the_line_of_the_users_file(
+    traced, tmp_path, coartic, monkeypatch
+):
+    monkeypatch.setattr(sections, "attempt", attempt)
+    text = """from coartic.analysis import table
+@table("Wrong", "a | a")
+def list_wrong(study):
+    yield "row", {"a": study.runs["nothing"].sum(), "run_ids": ""}
+"""
+    file = own_file(tmp_path, text)
+    code, _, error = coartic("report", traced.folder, "--out", tmp_path / "r", "--with", file)
+    assert (code, "KeyError: 'nothing' (own.py, line 4)" in error) == (1, True), error
+
+
+def test_a_folder_takes_reports_with_and_without_own_tables(traced, tmp_path, coartic):
+    for own in (["--with", own_file(tmp_path)], [], ["--with", own_file(tmp_path)]):
+        code, _, error = coartic("report", traced.folder, "--out", tmp_path / "r", *own)
+        assert code == 0, error
+        assert ("Mean hands" in (tmp_path / "r" / "report.html").read_text("utf-8")) == bool(own)

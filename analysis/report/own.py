@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import importlib.util
+import inspect
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from coartic.analysis.figures.plot import FIGURES
 from coartic.analysis.report.sections import Section
 from coartic.analysis.tables import TABLES
+from coartic.analysis.words import id_of
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line
 from coartic.internal.user_files import import_from
@@ -29,27 +32,31 @@ def own_section(files: Sequence[Path]) -> Section | None:
     Raises
     ------
     CoarticError
-        A file does not exist or cannot be imported, makes no table and no figure, or makes one with
-        an id that is taken.
+        A file does not exist or cannot be imported, makes no table and no figure, or makes one
+        without an id or with one that exists already.
     """
     ours = {**TABLES}, {**FIGURES}
     try:
         for file in files:
             before = {**TABLES}, {**FIGURES}
             _import(file)
-            changed = [
-                name
-                for now, then in ((TABLES, before[0]), (FIGURES, before[1]))
-                for name in now
-                if now[name] is not then.get(name)
+            made: list[Callable[..., Any]] = [
+                *(table.rows for name, table in TABLES.items() if table is not before[0].get(name)),
+                *(draw for name, draw in FIGURES.items() if draw is not before[1].get(name)),
             ]
-            if not changed:
+            if not made:
                 raise CoarticError(f"{file} makes no table and no figure: use @table or @figure")
-            if taken := [name for name in changed if name in {**before[0], **before[1]}]:
-                raise CoarticError(
-                    f"{file}: the id {taken[0]!r} is taken; rename function list_ or draw_"
-                    f"{taken[0].replace('-', '_')}"
-                )
+            for function in made:
+                name, where = id_of(function), f"{file}, line {_line_of(function)}"
+                if not name:
+                    raise CoarticError(
+                        f"{where}: function {function.__name__} must be named list_NAME or "
+                        "draw_NAME"
+                    )
+                if name in {**before[0], **before[1]}:
+                    raise CoarticError(
+                        f"{where}: id {name!r} exists already; rename function {function.__name__}"
+                    )
         tables = tuple(TABLES[name] for name in TABLES if name not in ours[0])
         figures = tuple(FIGURES[name] for name in FIGURES if name not in ours[1])
     finally:
@@ -62,24 +69,31 @@ def own_section(files: Sequence[Path]) -> Section | None:
     return Section(OWN, title, tables, figures, single=False, unfolded=tables)
 
 
+def _line_of(function: Callable[..., Any]) -> int:
+    """Return the line at which a decorated function begins."""
+    return int(inspect.unwrap(function).__code__.co_firstlineno)
+
+
 def _import(file: Path) -> None:
     """Import a file. Raises CoarticError, with the line, if that fails."""
     if not file.is_file():
         raise CoarticError(f"file {file} does not exist")
-    import_from(file.resolve().parent)
-    spec = importlib.util.spec_from_file_location(f"coartic_report_{file.stem}", file)
+    path = file.resolve()
+    import_from(path.parent)
+    spec = importlib.util.spec_from_file_location(f"coartic_report_{file.stem}", path)
     if spec is None or spec.loader is None:
         raise CoarticError(f"{file} is no Python file: its name must end in .py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         lines = [
             each.lineno
             for each in traceback.extract_tb(error.__traceback__)
-            if each.filename == str(file)
+            if each.filename == str(path)
         ]
-        line = getattr(error, "lineno", None) or (lines[-1] if lines else None)
-        where = f", line {line}" if line else ""
+        if isinstance(error, SyntaxError) and error.filename == str(path):
+            lines.append(error.lineno)
+        where = f", line {lines[-1]}" if lines else ""
         raise CoarticError(f"{file}{where}: {error_line(error)}") from None

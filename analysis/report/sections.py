@@ -77,6 +77,7 @@ from coartic.analysis.words import (
 from coartic.errors import CoarticError
 from coartic.estimates import MIN_VALUES
 from coartic.internal.text import error_line, one_line, pluralize
+from coartic.internal.user_files import is_users
 from coartic.method import TRIALS
 from coartic.runs.plan import world_title
 
@@ -339,15 +340,21 @@ def attempt(
 
     The result is a part of a report, and ``name`` is the name of this part. The exception, with its
     file and line, is stored in ``failures`` with the key ``name``, unless there is an entry with
-    this key already. A CoarticError is not caught.
+    this key already. If a file of the user is involved, the line is the last one in such a file. A
+    CoarticError is not caught.
     """
     try:
         return make(*args)
     except CoarticError:
         raise
     except Exception as error:
-        frame = traceback.extract_tb(error.__traceback__)[-1]
-        where = f"{Path(frame.filename).name}, line {frame.lineno}"
+        places = [
+            (str(frame.f_globals.get("__name__")), Path(frame.f_code.co_filename), line)
+            for frame, line in traceback.walk_tb(error.__traceback__)
+        ]
+        users = [place for place in places if is_users(*place[:2])]
+        _, path, line = (users or places)[-1]
+        where = f"{path.name}, line {line}"
         failures.setdefault(name, f"{error_line(error)} ({where})")
         return None
 

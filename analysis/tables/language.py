@@ -15,12 +15,14 @@ from a caption, a string that describes its columns, and a function that yields 
 from __future__ import annotations
 
 import html
+import inspect
 import itertools
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -165,7 +167,7 @@ def table(
 def _frame_of(table: Table, study: Study) -> pd.DataFrame:
     """Return a table of a study as a frame (:meth:`Table.__call__`).
 
-    Raises KeyError if an entry of a row has no column, or if the table has rows, but none of them
+    Raises ValueError if an entry of a row has no column, or if the table has rows, but none of them
     has an entry for one of the columns. (A column with ``*`` in its ending needs no entries.)
     """
     named = list(table.rows(study))
@@ -178,9 +180,10 @@ def _frame_of(table: Table, study: Study) -> pd.DataFrame:
         else:
             names += [name + end for end in endings[ending]]
     if wrong := {*names} ^ {*rows.columns} if named else ():
-        raise KeyError(
-            f"table {table.id}: the rows and the columns must have the same names; only one of "
-            f"them has {sorted(wrong)}"
+        code = inspect.unwrap(table.rows).__code__
+        raise ValueError(
+            f"table {table.id} ({Path(code.co_filename).name}, line {code.co_firstlineno}): the "
+            f"rows and the columns must have the same names; only one of them has {sorted(wrong)}"
         )
     return _with_marks(rows.reindex(columns=names), study).rename_axis("row")
 

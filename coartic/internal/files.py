@@ -40,7 +40,8 @@ def publish(folder: Path, files: Mapping[str, bytes], ours: str) -> None:
 
     Files of earlier calls that are not in ``files`` are removed; so is the subfolder of a removed
     file, if it is empty then. Files that :data:`LISTING` does not list are not changed, and files
-    whose names the caller never writes are not removed: the list may be somebody else's.
+    whose names the caller never writes are not removed, but stay listed: the list may be somebody
+    else's.
 
     Parameters
     ----------
@@ -70,11 +71,12 @@ def publish(folder: Path, files: Mapping[str, bytes], ours: str) -> None:
         list_files({*old_files, *files})  # so that an interrupted call leaves no unknown file
         for name, data in files.items():
             write_atomically(folder / name, data)
-        for name in {name for name in old_files - {*files} if re.fullmatch(ours, name)}:
+        old_ones = {name for name in old_files - {*files} if re.fullmatch(ours, name)}
+        for name in old_ones:
             (folder / name).unlink(missing_ok=True)
             with contextlib.suppress(OSError):  # the folder has other files
                 (folder / name).parent.rmdir()
-        list_files(files)
+        list_files({*old_files, *files} - old_ones)
 
 
 def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
