@@ -18,7 +18,7 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import plain
 from coartic.method import Meter
 from coartic.pictures.trajectories import Trajectory, trajectory
-from coartic.runs.plan import Job
+from coartic.runs.plan import Cell, Job
 from coartic.runs.record import OF_NOISE, PREFIXES, UNREPEATED, Row, judged, too_long
 from coartic.runs.shipped import open_results
 
@@ -134,8 +134,8 @@ def perform_runs_again(runs: Sequence[Row], registered: Registry) -> Iterator[tu
         except CoarticError as error:
             version = plain(str(run.environment.get("coartic")), 20)
             raise CoarticError(
-                f"run {run['run_id']} cannot be performed here: {error}. It was made by coartic "
-                f"{version}."
+                f"run {run['run_id']} cannot be performed here: {error}. Coartic {version}, which "
+                "made it, can perform it again."
             ) from None
         jobs.append(replace(run.job, cell=replace(run.cell, method=method)))
         stored_runs[id(jobs[-1])] = run
@@ -186,19 +186,31 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
     """
     with open_results(folder) as store:
         plan = store.plan()
+        can_run = [_can_run(job.cell, registered) for job in plan]
         ids = [
             plan[position].run_id(number)
             for position, number, *_ in store.present()
-            if (method := plan[position].cell.method).name in registered
-            and registered[method.name].code == method.code
+            if can_run[position]
         ]
         if not ids:
             raise CoarticError(
-                f"{folder} has no run that can be performed again: its methods have other versions "
-                "or other code here"
+                f"{folder} has no run that can be performed again: its methods have other "
+                "versions, other code or other parameters here"
             )
         step = max(1, len(ids) // count)
         return [store.run(run_id) for run_id in ids[::step][:count]]
+
+
+def _can_run(cell: Cell, registered: Registry) -> bool:
+    """Return whether a method has the same code here, and accepts the parameters of a cell."""
+    method = registered.get(cell.method.name)
+    if method is None or method.code != cell.method.code:
+        return False
+    try:
+        method.complete(cell.parameters)
+    except CoarticError:
+        return False
+    return True
 
 
 def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int, list[str]]:

@@ -99,7 +99,7 @@ def test_withdrawn_parameters_stay_in_ids():
 
 
 def test_a_run_with_a_withdrawn_parameter_is_read_and_not_made_again(tmp_path, coartic):
-    """The folder is one in which 7.0.0 made a run with another value."""
+    """In a folder in which 7.0.0 also made a run with another value."""
     info = built_in()["dual-process/EC1-informed"]
     cell = replace(cell_of(load_task("ascending"), info, {"trials": 20}), parameters={})
     cell = replace(cell, parameters=info.complete({"trials": 20}) | {"pull": 0.5})
@@ -109,13 +109,15 @@ def test_a_run_with_a_withdrawn_parameter_is_read_and_not_made_again(tmp_path, c
     plain = Job(cell_of(load_task("ascending"), info, {"trials": 20}), 0, range(1), 60.0, "own", 20)
     outcomes = [perform_job(plain)[0]]
     with open_store_for_writing(folder) as store:
-        store.replace_plan([job], made_with())
-        store.write(score(job, outcomes))
+        store.replace_plan([job, plain], made_with())
+        for each in (job, plain):
+            store.write(score(each, outcomes))
     runs = load(folder).runs
-    assert runs.setting.str.contains("pull=0.5").all()
-    assert coartic("verify", folder)[0] == 0
+    assert runs.setting.str.contains("pull=0.5").tolist() == [True, False]
+    code, out, _ = coartic("verify", folder, "--again", "5")
+    assert (code, "1 run performed again: none with another result" in out) == (0, True)
     code, _, error = coartic("verify", folder, "--run", runs.run_id[0])
-    assert (code, "coartic 7.0.0 (commit a0cf376b) makes such runs" in error) == (2, True)
+    assert (code, "which made it, can perform it again" in error) == (2, True)
     with pytest.raises(CoarticError, match="pull is 0.5, but this parameter was withdrawn"):
         info.complete({"pull": 0.5})
 

@@ -302,7 +302,7 @@ def _without_withdrawn(method: type[Method], parameters: Mapping[str, Any]) -> d
         if name in parameters and parameters[name] != value:
             raise CoarticError(
                 f"method {method.name!r}: {name} is {brief_value(parameters[name])}, but this "
-                "parameter was withdrawn: coartic 7.0.0 (commit a0cf376b) makes such runs"
+                "parameter was withdrawn after version 7.0.0 (commit a0cf376b)"
             )
     return {name: parameters[name] for name in parameters if name not in withdrawn}
 
