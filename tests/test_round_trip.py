@@ -15,7 +15,7 @@ import pytest
 from coartic import CoarticError, MotionModel, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.planning import plan_suite
-from coartic.benchmarks.registry import registry
+from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import perform
 from coartic.benchmarks.worker import perform_job
 from coartic.model import PAPER, check_model, model_from
@@ -261,6 +261,14 @@ def test_a_conversion_that_is_made_once_is_allowed(suite, own, tmp_path):
 
 
 @pytest.mark.process
+def test_a_number_of_numpy_is_a_number():
+    info = built_in()["dual-process/EC1"]
+    asked = {"trials": np.int64(20), "epsilon": np.float64(0.3)}
+    assert info.complete(asked) == info.complete({"trials": 20, "epsilon": 0.3})
+    with pytest.raises(CoarticError, match="must be plain data"):
+        info.complete({"trials": object()})
+
+
 def test_names_of_settings_are_told_apart(suite, own):
     path = suite('grid = { value = [1, "1"] }', "'mine'")
     with pytest.raises(CoarticError, match="two settings have the name mine value=1 on ascending"):

@@ -264,7 +264,13 @@ def _validated(method: type[Method], parameters: Mapping[str, Any]) -> Any:
     """
     given = _without_withdrawn(method, parameters)
     try:
-        return method.Parameters.model_validate_json(json.dumps(given))
+        text = json.dumps(given, default=lambda value: value.tolist())  # of NumPy
+    except (AttributeError, TypeError):
+        raise CoarticError(
+            f"method {method.name!r}: the parameters {brief_value(given)} must be plain data"
+        ) from None
+    try:
+        return method.Parameters.model_validate_json(text)
     except ValidationError as error:
         names = list(method.Parameters.model_fields)
         problem, listed = explain(error, names), ", ".join(names) or "none"
