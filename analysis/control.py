@@ -32,7 +32,7 @@ import pandas as pd
 
 from coartic.analysis.methods import BY_TRIAL, LEARNERS, RANDOM_SEARCH, headline_methods
 from coartic.analysis.signatures import SIGNATURES, Part, TwoContexts, context_pairs
-from coartic.analysis.study import MAX_EXECUTED, Study, solved
+from coartic.analysis.study import MAX_EXECUTED, Study, shared_cells, solved
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import HANDS, Array
 
@@ -86,7 +86,7 @@ def with_control(
     ... # doctest: +SKIP
     """
     of_method = signature_by_hands(study, signature, task, label)
-    total = min(len(solved(study.cells[task, label])), MAX_EXECUTED)
+    total = min(len(solved(shared_cells(study)[task, label])), MAX_EXECUTED)
     pairs = {}
     for hands, values in sorted(of_method.items(), key=lambda item: -len(item[1])):
         if len(values) >= MIN_SHARE * total:
@@ -107,7 +107,7 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
     together. The dict is empty if no run has the signature. It is cached: do not change it.
     """
     values = study.signature(signature, task, label).to_numpy(np.float64)
-    hands = np.array(study.cells[task, label].hands.fillna("").tolist(), dtype=object)
+    hands = np.array(shared_cells(study)[task, label].hands.fillna("").tolist(), dtype=object)
     if not SIGNATURES[signature].by_hands:
         hands[:] = ""
     has_value = np.isfinite(values)
@@ -157,7 +157,7 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
     """
     if len(study.tasks[task].hands) == 1:
         return True
-    runs = study.cells[task, label]
+    runs = shared_cells(study)[task, label]
     if not study.methods.method_id[label].startswith(METHOD_PREFIX):
         return bool(_first(runs, "idle_arm", True))
     name = study.methods.condition[label] or _first(runs, "base")  # that of a user's condition
@@ -194,7 +194,7 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
     labels = dict[tuple[str, float, bool], str]()
     of_search = study.methods[study.methods.algorithm == "random search"]
     for label in map(str, of_search.index):
-        cell = study.cells.get((task, label))
+        cell = shared_cells(study).get((task, label))
         if cell is None or _first(cell, "stages", 1) > 1:
             continue
         hands = {*solved(cell).hands}
@@ -214,7 +214,7 @@ def _most_trials(study: Study, task: str, label: str) -> float:
 
     The result is 0 for a method without trials.
     """
-    return float(study.cells[task, label].trials.fillna(0).max())
+    return float(shared_cells(study)[task, label].trials.fillna(0).max())
 
 
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
@@ -331,7 +331,7 @@ def shared_goals(study: Study, label: str, *, part: Part = "all") -> Iterator[Tw
     """
     for first, second, shared in context_pairs(study.individual_tasks):
         keys = (first, label), (second, label)
-        if study.cells.keys() >= {*keys}:
+        if shared_cells(study).keys() >= {*keys}:
             runs = study.executed(first, label), study.executed(second, label)
             for goal in range(1, shared + 1):
                 for hand in HANDS:

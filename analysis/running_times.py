@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from coartic.analysis.frames import DUPLICATE, SCORES, checked, refuse_rows, scored
 from coartic.analysis.standings import cells_of, ranked_tasks, runs_by_method
-from coartic.analysis.study import Study, load, solved
+from coartic.analysis.study import Study, load, shared_cells, solved
 from coartic.errors import CoarticError
 from coartic.estimates import FEWER_RESAMPLES, IN_CACHE, MIN_VALUES, SEED, TAILS, Estimate, slices
 from coartic.internal.limits import brief_value, real_array
@@ -278,7 +278,7 @@ def times_of(
     """
     initial, optimum = target_ranges(study)[task]
     targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)
-    runs, learned, rows = study.cells[task, label], improvements(study), []
+    runs, learned, rows = shared_cells(study)[task, label], improvements(study), []
     totals = runs[spend]
     if spend == "solve_s":
         totals = solve_times(solved(runs)).reindex(runs.index)

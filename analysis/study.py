@@ -578,13 +578,17 @@ class Study:
         """
         return methods_of(self.runs, self.declared, self.marks)
 
-    @cached_property
+    @property
     def cells(self) -> Mapping[CellKey, pd.DataFrame]:
         """A mapping from each cell to its runs, including failed runs.
 
         Cells are in the order of the plan. A key is a pair: the name of the task, and the label of
         the method. Raises CoarticError for a study of several worlds.
         """
+        return _Frames(shared_cells(self))
+
+    @cached_property
+    def _cells(self) -> dict[CellKey, pd.DataFrame]:
         check_study(self)
         runs = self.runs
         runs.attrs = {}  # pandas would copy attrs with each column
@@ -592,7 +596,7 @@ class Study:
         for key, rows in runs.groupby(["task", "label"], sort=False).indices.items():
             is_slice = rows[-1] - rows[0] < len(rows)  # usual; a slice shares memory with the runs
             cells[key] = runs.iloc[slice(rows[0], rows[-1] + 1) if is_slice else rows]
-        return _Frames(cells)
+        return cells
 
     def sequences(self, task: str) -> pd.DataFrame:
         """Return the reward of the corrective process alone on a task, for each hand sequence.
@@ -693,16 +697,16 @@ class Study:
             stored ticks.
         """
         condition = f"{METHOD_PREFIX}{method}"  # conditions of the learner can be short: EC4
-        if (task, method) not in self.cells and (task, condition) in self.cells:
+        if (task, method) not in shared_cells(self) and (task, condition) in shared_cells(self):
             method = condition
-        if (task, method) not in self.cells:
-            on_task = [name for on, name in self.cells if on == task]
+        if (task, method) not in shared_cells(self):
+            on_task = [name for on, name in shared_cells(self) if on == task]
             asked = ("method", method, on_task) if on_task else ("task", task, self.tasks)
             raise CoarticError(f"{self.folder}: {unknown(*asked)}")
         if (task, method, replay) in self._executed:
             return self._executed[task, method, replay]
         stored = self.movements("replay" if replay else "solution")
-        ids = map(str, solved(self.cells[task, method]).run_id)
+        ids = map(str, solved(shared_cells(self)[task, method]).run_id)
         solutions = {run_id: stored[run_id] for run_id in ids if run_id in stored}
         executed = []
         with explain_errors(self.folder):
@@ -786,12 +790,12 @@ class Study:
         """
         if name not in SIGNATURES:
             raise CoarticError(unknown("signature", name, SIGNATURES))
-        cells = [*self.cells] if task is None or method is None else [(task, method)]
+        cells = [*shared_cells(self)] if task is None or method is None else [(task, method)]
         parts = []
         for key in cells:
             if (name, *key, replay) not in self._signatures:
                 executed = self.executed(*key, replay=replay)
-                runs = self.cells[executed.task.name, executed.label]
+                runs = shared_cells(self)[executed.task.name, executed.label]
                 values = pd.Series(np.nan, runs.index, name=name)
                 values[runs.run_id.isin(executed.run_ids)] = SIGNATURES[name].each(executed)
                 self._signatures[name, *key, replay] = values
@@ -841,6 +845,14 @@ class Study:
         drawn = {name for name in self.tasks if address_of(name.partition(".")[0]) is not None}
         left_out = drawn if len(drawn) > 8 else ()
         return {name: task for name, task in self.tasks.items() if name not in left_out}
+
+
+def shared_cells(study: Study) -> dict[CellKey, pd.DataFrame]:
+    """Return the frames of :attr:`Study.cells` themselves, for tables: a copy of each takes long.
+
+    The dict is cached: do not change it.
+    """
+    return study._cells
 
 
 def ending_of(study: Study) -> str:

@@ -56,7 +56,7 @@ from coartic.analysis.running_times import (
 from coartic.analysis.signatures import TwoContexts
 from coartic.analysis.standings import ranked_tasks, reference, runs_on, standings
 from coartic.analysis.statistics import other_tasks
-from coartic.analysis.study import Study, solved
+from coartic.analysis.study import Study, shared_cells, solved
 from coartic.analysis.tables import (
     gaps_by_family,
     gaps_of_settings,
@@ -324,7 +324,8 @@ def draw_saved(study: Study) -> Parts | None:
     if not len(rows):
         return None
     gaps = [
-        solved(study.cells[cell]).gap.mean() for cell in zip(rows.task, rows.method, strict=True)
+        solved(shared_cells(study)[cell]).gap.mean()
+        for cell in zip(rows.task, rows.method, strict=True)
     ]
     learners = rows.method.map({label: place for place, label in enumerate(LEARNERS)})
     most = learners == learners.groupby(rows.task).transform("max")  # that explores most
@@ -790,7 +791,7 @@ def _runs_with_curves(
     """
     cells = {
         (task, label): runs
-        for (task, label), cell in study.cells.items()
+        for (task, label), cell in shared_cells(study).items()
         if task in study.individual_tasks and len(runs := solved(cell[cell.run_id.isin(run_ids)]))
     }
     rows = study.methods[study.methods.index.isin([label for _, label in cells])]

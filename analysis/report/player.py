@@ -9,7 +9,7 @@ from typing import Any
 from coartic.analysis.control import contexts_of_control, shared_goal
 from coartic.analysis.methods import EC1, EC4
 from coartic.analysis.standings import cells_of, runs_by_method, standings
-from coartic.analysis.study import MAX_EXECUTED, CellKey, Study, solved, typical_run
+from coartic.analysis.study import MAX_EXECUTED, CellKey, Study, shared_cells, solved, typical_run
 from coartic.analysis.tables import SHORT_ID, list_not_ranked, list_ranking, shown_columns
 from coartic.play.page import player_figure, preset_of
 from coartic.robot import HANDS
@@ -142,7 +142,7 @@ def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
     The dict is empty if the cell has no solved run, or if a movement of one of the first 500 solved
     runs is of kind ``path``.
     """
-    cell = study.cells.get(key)
+    cell = shared_cells(study).get(key)
     if cell is None or not len(good := solved(cell)[:MAX_EXECUTED]):
         return {}
     run, stored = typical_run(good), study.movements("solution")

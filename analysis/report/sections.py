@@ -48,7 +48,7 @@ from coartic.analysis.standings import (
     solved_tasks,
     standings,
 )
-from coartic.analysis.study import Study, ending_of
+from coartic.analysis.study import Study, ending_of, shared_cells
 from coartic.analysis.tables import (
     Table,
     is_setting,
@@ -486,7 +486,8 @@ def limits(study: Study) -> dict[str, Any]:
     algorithm, papers = study.methods.algorithm, study.methods.is_learner
     trials = {int(n) for n in runs[runs.label.map(algorithm) == "learner"].trials.dropna()}
     fewest = min(
-        (len(cell) for (_, label), cell in study.cells.items() if papers[label]), default=RUNS
+        (len(cell) for (_, label), cell in shared_cells(study).items() if papers[label]),
+        default=RUNS,
     )
     tasks, optima = list(study.individual_tasks.values()), defaultdict[str, list[str]](list)
     for task in tasks:

@@ -21,7 +21,7 @@ from coartic.analysis.statistics import (
     exchange_test,
     holm,
 )
-from coartic.analysis.study import Study, solved
+from coartic.analysis.study import Study, shared_cells, solved
 from coartic.analysis.tables.language import Row, Rows, named, run_ids, table
 from coartic.estimates import (
     LEVEL,
@@ -97,7 +97,7 @@ def list_contexts(study: Study) -> Rows:
                 "equivalent": shared.parts[0],
                 "other": shared.parts[1],
                 **dict.fromkeys(("control", "control_runs", "p_random_search"), math.nan),
-                **run_ids(*(study.cells[task.name, label] for task in shared.tasks)),
+                **run_ids(*(shared_cells(study)[task.name, label] for task in shared.tasks)),
             }
             if (control := contexts_of_control(study, shared)) is not None:
                 row["control"], row["control_runs"] = control.posture_difference, control.n
@@ -177,7 +177,7 @@ def list_signatures(study: Study) -> Rows:
         for ending in ("", *endings, "_p", "_control_runs")
     }
     for name, label in itertools.product(study.individual_tasks, labels):
-        cell = study.cells.get((name, label))
+        cell = shared_cells(study).get((name, label))
         if cell is None or not len(solved(cell)):
             continue
         rows = dict[str, Row]()
@@ -269,7 +269,7 @@ def list_saved(study: Study) -> Rows:
     left out if the corrective process does not complete the task with the hands of the run. A row
     without runs is left out.
     """
-    for (task, label), runs in study.cells.items():
+    for (task, label), runs in shared_cells(study).items():
         if (
             task not in study.individual_tasks
             or study.methods.is_search[label]

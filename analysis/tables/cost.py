@@ -22,7 +22,7 @@ from coartic.analysis.running_times import (
 from coartic.analysis.standings import (
     cells_of,
 )
-from coartic.analysis.study import Study, solved
+from coartic.analysis.study import Study, shared_cells, solved
 from coartic.analysis.tables.language import Row, Rows, named, run_ids, table
 from coartic.estimates import (
     Estimate,
@@ -112,7 +112,7 @@ def list_learning(study: Study) -> Rows:
     if study.is_noisy:  # the best trial so far is partly luck
         return
     learned = improvements(study)
-    for (task, label), runs in study.cells.items():
+    for (task, label), runs in shared_cells(study).items():
         is_shown = task in study.individual_tasks and not study.methods.is_search[label]
         is_solved = len(solved(runs)) == len(runs) and learned.keys() >= {*runs.run_id}
         fewest = runs.trials.min()

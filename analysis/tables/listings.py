@@ -9,7 +9,7 @@ import numpy as np
 from coartic.analysis.running_times import (
     solve_times,
 )
-from coartic.analysis.study import Study, solved, typical_run
+from coartic.analysis.study import Study, shared_cells, solved, typical_run
 from coartic.analysis.tables.language import SHORT_ID, Row, Rows, named, run_ids, table
 from coartic.analysis.words import (
     commonest,
@@ -95,7 +95,7 @@ def list_methods(study: Study) -> Rows:
     median; the entry is missing if no run is solved.
     """
     places, rows = {task: place for place, task in enumerate(study.individual_tasks)}, []
-    for (task, label), runs in study.cells.items():
+    for (task, label), runs in shared_cells(study).items():
         if task not in places:
             continue
         good = solved(runs)
@@ -134,7 +134,7 @@ def list_failed(study: Study) -> Rows:
     There is a row for each pair of a task and a method with at least one failed run. Column
     ``reasons`` contains the three most frequent reasons with their numbers of runs.
     """
-    for (task, label), runs in study.cells.items():
+    for (task, label), runs in shared_cells(study).items():
         if len(solved(runs)) < len(runs):
             failed = runs[runs.status != "ok"]
             reasons = "; ".join(commonest(failed.reason.fillna("")))

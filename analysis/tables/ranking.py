@@ -38,7 +38,7 @@ from coartic.analysis.statistics import (
     holm,
     stratified_test,
 )
-from coartic.analysis.study import Study, solved
+from coartic.analysis.study import Study, shared_cells, solved
 from coartic.analysis.tables.language import Row, Rows, run_ids, table
 from coartic.estimates import (
     FEWER_RESAMPLES,
@@ -80,7 +80,9 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
         ahead, tests = list[bool](), list[Estimate]()
         for name, task in study.individual_tasks.items():
             learning = EC4 if len(task.hands) > 1 else EC1
-            runs, learner = (study.cells.get((name, each)) for each in (str(label), learning))
+            runs, learner = (
+                shared_cells(study).get((name, each)) for each in (str(label), learning)
+            )
             if runs is None or learner is None or label == learning:
                 continue
             rewards, learned = (solved(cell).value.to_numpy(np.float64) for cell in (runs, learner))
