@@ -20,6 +20,7 @@ from coartic.runs.plan import Job
 from coartic.runs.record import Outcome
 
 WORKERS_S = 600.0  # longest wait for a worker
+ANSWER_S = 60.0  # longest wait for an answer of the scheduler
 _PAUSE_S = 0.05  # pause before the next look for finished jobs
 _RETURN_S = 2.0  # time that a restarted worker gets to connect again
 _LOGGERS = "distributed", "distributed.client", "tornado.application", "asyncio"
@@ -70,7 +71,7 @@ class Dask:
         CoarticError
             One of these is the case:
 
-            - the scheduler does not answer, or the connection to it is lost;
+            - the scheduler does not answer for a minute, or the connection to it is lost;
             - the scheduler has no worker for 10 minutes;
             - a job fails in three attempts, because the version or the code of the job's method
               differs on the workers, or because they cannot perform the job;
@@ -124,8 +125,14 @@ class Dask:
 
     def _wait_for_workers(self, client: Any) -> None:
         for _ in range(2):
-            if client.nthreads():
-                return
+            try:  # as client.nthreads(), which waits for ever if the scheduler's machine is lost
+                if client.sync(client.scheduler.ncores, callback_timeout=ANSWER_S):
+                    return
+            except TimeoutError:
+                raise CoarticError(
+                    f"Dask scheduler {self.address} has not answered for {ANSWER_S:g} s: start it "
+                    f"again, with its workers. {_GOES_ON}"
+                ) from None
             time.sleep(_RETURN_S)
         self.say(f"Dask scheduler {self.address} has no workers: waiting for one")
         try:

@@ -1,5 +1,7 @@
 """Runs on a Dask cluster: the same results, and a sentence for whatever is wrong with it."""
 
+import asyncio
+
 import pytest
 
 from coartic import CoarticError, load_task
@@ -90,5 +92,22 @@ def test_a_scheduler_that_is_lost(distributed, tmp_path, monkeypatch):
 
         with pytest.raises(CoarticError, match=r"is lost.*repeat the command"):
             perform(planned(CELLS), tmp_path / "out", executor=executor, watch=watch)
+    again = run_and_write(tmp_path / "out", CELLS)
+    assert (again.runs.status == "ok").all()
+
+
+def test_a_scheduler_that_does_not_answer(address, tmp_path, monkeypatch):
+    """As one on a machine that has lost its power: nobody closes the connection."""
+    executor = Dask(address)
+    client = executor._client()
+    monkeypatch.setattr(executor, "_client", lambda: client)
+    monkeypatch.setattr(cluster_module, "ANSWER_S", 0.3)
+
+    async def sleep(**_):
+        await asyncio.sleep(60)
+
+    client.scheduler.ncores = sleep
+    with pytest.raises(CoarticError, match=r"has not answered for 0.3 s.*repeat the command"):
+        perform(planned(CELLS), tmp_path / "out", executor=executor)
     again = run_and_write(tmp_path / "out", CELLS)
     assert (again.runs.status == "ok").all()
