@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import daqp
 import numpy as np
 
 from coartic.method import MethodError
@@ -94,6 +93,8 @@ def _solve_level(
     contains the right-hand sides of the task's constraints. Return v and the number of iterations.
     Raises MethodError if the solver fails.
     """
+    import daqp  # results are read without solvers
+
     task, joints = rows.shape
     matrix = np.zeros((task + 2 * joints, len(gradient)))
     matrix[:task, :-joints] = -1.0

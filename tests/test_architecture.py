@@ -132,6 +132,19 @@ def test_the_package_imports_what_is_asked_for():
     assert "dual-process/" in said
 
 
+WITHOUT_SOLVERS = """
+import sys
+sys.modules |= dict.fromkeys(["casadi", "clarabel", "cma", "cvxpy", "daqp", "osqp"])
+from coartic.analysis import load, ranking
+print(len(ranking(load("shipped").worlds[""].runs)))
+"""
+
+
+@pytest.mark.process
+def test_results_are_read_without_solvers():
+    assert int(python("-c", WITHOUT_SOLVERS).stdout) > 0
+
+
 def test_kernels_are_read_by_their_doors_alone():
     """By the learner's kernel and posture-based planning besides, and by what sets Numba up."""
     others = {
