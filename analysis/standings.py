@@ -7,7 +7,9 @@ Searches for the optimum are references and are not ranked.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -15,10 +17,17 @@ import pandas as pd
 
 from coartic.analysis.frames import ranking
 from coartic.analysis.methods import BY_TRIAL
+from coartic.analysis.statistics import (
+    are_separated,
+    means_of_other_runs,
+    means_on_other_tasks,
+    place_intervals,
+)
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import listed, number
-from coartic.estimates import MIN_VALUES
+from coartic.estimates import MIN_TASKS, MIN_VALUES
 from coartic.internal.text import pluralize
+from coartic.robot import Array
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
@@ -49,6 +58,8 @@ _OWN_NOT_HERE = f"{NOT_HERE}; coartic run with its method file makes them, if it
 """The same for a method from a file."""
 ESTIMATES, COUNTS = ("gap", "share"), ("tasks", "runs", "failed")
 """Columns of :func:`.ranking` that are estimates with an interval, and columns that are counts."""
+PLACES = ("place", "place_low", "place_high", "separated")
+"""Columns of :func:`standings` on the places of ranked methods."""
 _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "parameters", "information"]
 """Columns of runs that no ranking uses. They are dropped to save memory in large folders."""
 
@@ -156,6 +167,16 @@ def standings(study: Study) -> pd.DataFrame:
           reward of each trial, and this number differs from the number that was asked for;
         - how many executions failed in a world with noise.
 
+        ``place_low`` and ``place_high`` are the ends of the 95 % interval of a method's place among
+        the ranked methods, ``place`` is this interval in words, such as ``2–3``, and ``separated``
+        says whether the method and the next one are separated (:func:`.are_separated`). If a task
+        is an instance of a family, instances are resampled within families, otherwise runs within
+        tasks. The four columns are empty or NaN
+
+        - if a method is not ranked;
+        - if instances are resampled, and there are fewer than three of a family;
+        - if runs are resampled, and a stochastic method has fewer than five on a task.
+
         The frame also contains a row for each method, except searches for the optimum, that has
         runs only in other worlds (:attr:`.Study.elsewhere`). The reason then begins with
         :data:`NOT_HERE`.
@@ -173,7 +194,7 @@ def standings(study: Study) -> pd.DataFrame:
         elsewhere = elsewhere.assign(why=why, note="", **dict.fromkeys(COUNTS, 0))
     if not len(runs):
         estimates = [f"{name}{end}" for name in ESTIMATES for end in ("", "_low", "_high")]
-        columns = [*estimates, "without_gain", *COUNTS, "why", "note", *study.methods]
+        columns = [*estimates, "without_gain", *COUNTS, "why", "note", *study.methods, *PLACES]
         return elsewhere.reindex(columns=columns)
     by_method = runs_by_method(study)
     rows = ranking(runs.drop(columns="budget")).loc[[*by_method]].join(study.methods)
@@ -198,9 +219,69 @@ def standings(study: Study) -> pd.DataFrame:
     rows = rows.assign(why=reasons, note=notes)
     if len(elsewhere):
         rows = pd.concat([rows, elsewhere])
-    return rows.sort_values(
+    rows = rows.sort_values(
         ["why", "gap"], key=lambda column: column != "" if column.name == "why" else column
     )
+    means = _resampled_gaps(study, [*map(str, rows.index[rows.why == ""])])
+    places: list[tuple[object, ...]] = [("", math.nan, math.nan, math.nan) for _ in rows.index]
+    if means is not None:
+        separated = *are_separated(means), math.nan
+        places[: len(separated)] = [
+            (f"{low}–{high}" if low < high else f"{low}", low, high, apart)
+            for (low, high), apart in zip(place_intervals(means), separated, strict=True)
+        ]
+    return rows.join(pd.DataFrame(places, rows.index, [*PLACES], dtype=object))
+
+
+def has_instances(study: Study) -> bool:
+    """Return whether methods are ranked on a task that is an instance of a family."""
+    return any(study.tasks[name].family for name in ranked_tasks(study))
+
+
+def _resampled_gaps(study: Study, methods: Sequence[str]) -> Array | None:
+    """Return the mean gaps of ranked methods in resamples; None if there is too little to resample.
+
+    The shape is ``(resamples, methods)``. :func:`standings` says what is resampled.
+    """
+    if not methods:
+        return None
+    tasks = ranked_tasks(study)
+    gaps = [runs_by_method(study)[label].groupby("task").gap for label in methods]
+    if has_instances(study):
+        strata = defaultdict[str, list[str]](list)
+        for name in tasks:
+            strata[study.tasks[name].family or name].append(name)
+        families = [names for names in strata.values() if study.tasks[names[0]].family]
+        if min(map(len, families)) < MIN_TASKS:
+            return None
+        means = pd.concat([of.mean() for of in gaps], axis=1)
+        return means_on_other_tasks([means.loc[names].to_numpy() for names in strata.values()])
+    samples = list[list[Array]]()
+    for label, of in zip(methods, gaps, strict=True):
+        runs = [of.get_group(task).to_numpy(np.float64) for task in tasks]
+        if not study.methods.stochastic[label]:  # its gaps are exact
+            runs = [each.mean(keepdims=True) for each in runs]
+        elif min(map(len, runs)) < MIN_VALUES:
+            return None
+        samples.append(runs)
+    return means_of_other_runs(samples)
+
+
+def neighbours(study: Study) -> str:
+    """Return how many neighbours in the ranking are not separated, in a sentence.
+
+    If only runs are resampled, a second sentence says so. The result is empty without places, and
+    if only one method is ranked.
+    """
+    separated = standings(study).separated.dropna()
+    if separated.empty:
+        return ""
+    count = int((~separated.astype(bool)).sum())
+    are = "is" if count == 1 else "are"
+    sentence = f"{count} of {pluralize(len(separated), 'neighbour')} {are} not separated."
+    if not has_instances(study):
+        sentence += " Only runs are resampled, because the tasks are fixed."
+    return sentence
 
 
 def has_few_runs(study: Study, methods: Iterable[str], tasks: Iterable[str]) -> bool:

@@ -22,6 +22,8 @@ Intervals:
 - The interval of :func:`other_tasks` is for other tasks of the same families. The bootstrap is
   hierarchical (Davison & Hinkley 1997, section 3.8): it resamples instances within families, and
   then runs within instances. Families are fixed and have the same weight.
+- The intervals of :func:`place_intervals` are for other tasks (:func:`means_on_other_tasks`) or for
+  other runs on the same tasks (:func:`means_of_other_runs`).
 
 A mixed-effects model is not used, because its assumptions do not hold: gaps to an optimum are
 skewed and bounded by 0, and their spread over runs differs between methods and tasks.
@@ -616,3 +618,105 @@ def other_tasks(scores: Scores) -> Estimate:
     least = np.mean([min(runs.min() for runs in family) for family in families])
     most = np.mean([max(runs.max() for runs in family) for family in families])
     return Estimate(mean, max(float(low), float(least)), min(float(high), float(most)), n=n)
+
+
+def means_on_other_tasks(strata: Sequence[Array]) -> Array:
+    """Return bootstrap means of several methods over tasks, which are resampled within strata.
+
+    All methods have the same resampled tasks, and all tasks have the same weight.
+
+    Parameters
+    ----------
+    strata : sequence of ndarray, shapes (tasks, methods)
+        For each stratum, such as a family, the mean score of each method on each task. A stratum of
+        one task is the same in all resamples.
+
+    Returns
+    -------
+    ndarray, shape (resamples, methods)
+        The mean of each method over the tasks of each resample.
+    """
+    sums = sum(
+        len(scores) * means for scores, means in zip(strata, _resampled_means(strata), strict=True)
+    )
+    return np.asarray(sums / sum(map(len, strata)))
+
+
+def means_of_other_runs(samples: Sequence[Sequence[Array]]) -> Array:
+    """Return bootstrap means of several methods over tasks and runs.
+
+    Runs are resampled within tasks, for each method by itself.
+
+    Parameters
+    ----------
+    samples : sequence of sequences of ndarray, shapes (runs,)
+        For each method, the scores of its runs on each task. All methods have the same tasks.
+
+    Returns
+    -------
+    ndarray, shape (resamples, methods)
+        The mean over tasks of the mean over the runs of each resample.
+    """
+    cells = [runs[:, None] for method in samples for runs in method]
+    means = np.concatenate([*_resampled_means(cells)], axis=1)
+    return np.asarray(means.reshape(len(means), len(samples), -1).mean(axis=2))
+
+
+def _resampled_means(strata: Sequence[Array]) -> Iterator[Array]:
+    """Yield the means of 1,999 resamples of each stratum, an array of shape (n, columns)."""
+    sizes = tuple((len(values), len(values)) for values in strata)
+    drawn = _places_by_stratum(sizes, FEWER_RESAMPLES, exact=False)
+    for values, chunks in zip(strata, drawn, strict=True):
+        means = np.empty((FEWER_RESAMPLES, values.shape[1]))
+        for part, rows in chunks:
+            for column, scores in enumerate(values.T):
+                means[part, column] = scores[rows].mean(axis=1)
+        yield means
+
+
+def place_intervals(means: Array) -> list[tuple[int, int]]:
+    """Return the 95 % interval of the place of each method, the lowest mean first.
+
+    In a resample the places of a method are 1 + the number of methods with a lower mean, up to the
+    number of methods with a lower or equal mean. The interval is from the 2.5 % quantile of the
+    former to the 97.5 % quantile of the latter.
+
+    Parameters
+    ----------
+    means : ndarray, shape (resamples, methods)
+        The mean of each method in each resample. Means that differ by rounding are equal.
+
+    Returns
+    -------
+    list of pairs of int
+        The lowest and the highest place of each method.
+
+    Examples
+    --------
+    >>> place_intervals(np.array([[0.1, 0.3, 0.3]]))
+    [(1, 1), (2, 3), (2, 3)]
+    """
+    least, most, rounding = [], [], _rounding_of(means)
+    for row in means:
+        ordered = np.sort(row)
+        least.append(1 + np.searchsorted(ordered, row - rounding))
+        most.append(np.searchsorted(ordered, row + rounding, side="right"))
+    low = np.quantile(least, TAILS[0], axis=0, method="lower")
+    high = np.quantile(most, TAILS[1], axis=0, method="higher")
+    return [*zip(map(int, low), map(int, high), strict=True)]
+
+
+def are_separated(means: Array) -> list[bool]:
+    """Return whether the means of neighbours differ: of columns 0 and 1, of 1 and 2, and so on.
+
+    They differ if the 95 % interval of their difference over resamples leaves out 0. ``means`` has
+    shape ``(resamples, methods)``. The result has an entry for each method except the last.
+    """
+    low, high = np.quantile(np.diff(means, axis=1), TAILS, axis=0)
+    rounding = _rounding_of(means)
+    return [*map(bool, (low > rounding) | (high < -rounding))]
+
+
+def _rounding_of(means: Array) -> float:
+    """Return the largest difference between means that counts as a rounding error."""
+    return float(NEGLIGIBLE * np.abs(means).max())

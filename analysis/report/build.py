@@ -20,7 +20,7 @@ from coartic.analysis.figures.style import ONE
 from coartic.analysis.report import sections
 from coartic.analysis.report.player import player
 from coartic.analysis.report.sections import IN_NOISE, SECTIONS, Section
-from coartic.analysis.standings import reference
+from coartic.analysis.standings import neighbours, reference
 from coartic.analysis.study import Study, ending_of
 from coartic.analysis.tables import (
     TABLES,
@@ -208,9 +208,10 @@ def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str
     - ``figures``: a tuple for each figure: the plot, its SVG, and the SVGs of its panels for phones
       (:func:`.panels_for_page`);
     - ``shown``: a dict for each table that has rows, with its ``id``, the name of its ``file``
-      without suffix, its ``caption``, its number of ``rows``, its ``html``, whether it is
-      ``folded`` on the page (:attr:`.Section.unfolded`), and whether it ``is_printed``. All tables
-      are printed, except the table of methods that are not ranked.
+      without suffix, its ``caption``, its number of ``rows``, its ``html``, the sentence ``below``
+      it (:func:`.neighbours`), whether it is ``folded`` on the page (:attr:`.Section.unfolded`),
+      and whether it ``is_printed``. All tables are printed, except the table of methods that are
+      not ranked.
     """
     drawn = {plot.id for plot in first}
     draws = [draw for draw in section.figures if id_of(draw) + ending_of(study) not in drawn]
@@ -225,6 +226,7 @@ def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str
             words: dict[str, Any] = {"id": table.id + ending_of(study), "file": table.id}
             words |= {"is_printed": table is not list_not_ranked}
             words |= {"caption": caption_of(table, study), "rows": len(frame)}
+            words |= {"below": neighbours(study) if table is list_ranking else ""}
             tables.append({**words, "html": html_of(table, study, frame), "folded": folded})
     finding = sections.finding(study, section)
     is_answer = list_ranking in section.tables and sections.varies_parameters(study)

@@ -24,6 +24,7 @@ from coartic.analysis.running_times import (
     improvements,
 )
 from coartic.analysis.standings import (
+    PLACES,
     compared_runs,
     ranked_tasks,
     ranking_budget,
@@ -158,7 +159,8 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
         entries |= {f"on {task}": gaps.get(task, math.nan) for task in single}
         if ranked:
             names = ("without_gain", "share", "share_low", "share_high")
-            entries |= {name: row[name] for name in names} | {"gap_early": early[label]}
+            entries |= {name: row[name] for name in (*names, *PLACES)}
+            entries |= {"gap_early": early[label]}
             entries |= {name: runs[name].mean() for name in ("forward_kinematics", "cpu_s")}
         else:
             entries |= {name: row[name] for name in ("why", "tasks", "failed")}
@@ -169,6 +171,10 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
     "Gap and share of the possible gain, means over {tasks}, and gap on each",
     """
     method             | method                            |   | tex
+    place              | place
+    place_low
+    place_high
+    separated
     gap[]              | gap (%)                           | 1 | tex
     share[]            | share of the gain (%)             | 0 | tex
     information        | use of the reward
@@ -190,8 +196,9 @@ def list_ranking(study: Study) -> Rows:
     A row contains means over tasks of the gap, of the share of the possible gain, and of the gap
     after 1,000 trials (``gap_early``). It also contains the gap on each individual task that has a
     best known reward, and mean costs over runs: the number of forward-kinematics evaluations and
-    the CPU time (in s). Columns ``better`` and ``worse`` are numbers of individual tasks on which
-    the method differs significantly from the learner. Gaps and shares are fractions.
+    the CPU time (in s). The place is a 95 % interval, and ``separated`` is about the method in the
+    next row (:func:`.standings`). Columns ``better`` and ``worse`` are numbers of individual tasks
+    on which the method differs significantly from the learner. Gaps and shares are fractions.
     """
     return _standing_rows(study, ranked=True)
 

@@ -6,7 +6,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -125,6 +125,7 @@ def _say_ranking_of_world(study: Study) -> None:
 
     - the main finding, if the study varies parameters or no method is ranked;
     - which methods are not ranked, and why;
+    - how many neighbours are not separated;
     - to which rewards the gaps refer, and for which tasks this reward is known only from the
       folder, or not at all;
     - how many runs are needed for confidence intervals, if there are too few;
@@ -134,7 +135,7 @@ def _say_ranking_of_world(study: Study) -> None:
     ``study`` is a study of one world, a value of :attr:`.Study.worlds`.
     """
     from coartic.analysis.report.sections import SECTIONS, finding, limits
-    from coartic.analysis.standings import ranked_tasks, reference, standings
+    from coartic.analysis.standings import neighbours, ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
     from coartic.estimates import MIN_VALUES
 
@@ -149,13 +150,17 @@ def _say_ranking_of_world(study: Study) -> None:
     ]
     methods = methods.assign(name=names)
     ranked, unranked = methods[methods.why == ""], methods[methods.why != ""]
-    headings = ["method", "gap (%)", "share (%)", "runs", *(["note"] if any(ranked.note) else [])]
-    cells = [
-        [row["name"], interval(row, "gap", scale=100), interval(row, "share", 0, 100),
-         number(row["runs"]), row["note"]][: len(headings)]
-        for row in ranked.to_dict("records")
-    ]  # fmt: skip
-    say_table(headings, cells)
+    columns: dict[str, Iterable[str]] = {
+        "method": ranked.name,
+        "place": ranked.place,
+        "gap (%)": [interval(row, "gap", scale=100) for row in ranked.to_dict("records")],
+        "share (%)": [interval(row, "share", 0, 100) for row in ranked.to_dict("records")],
+        "runs": map(number, ranked.runs),
+        "note": ranked.note,
+    }
+    empty = {name for name in ("place", "note") if not any(ranked[name])}
+    shown = {name: [*texts] for name, texts in columns.items() if name not in empty}
+    say_table([*shown], [*zip(*shown.values(), strict=True)])
     has_answer = not (len(ranked) and study.varied.empty)
     answer = finding(study, SECTIONS[0]) if has_answer else []
     pairs = [("" if place else "Answer", sentence) for place, sentence in enumerate(answer)]
@@ -164,6 +169,8 @@ def _say_ranking_of_world(study: Study) -> None:
         ("Not ranked", f"{why}: {'; '.join(brief[of_reason.index])}")
         for why, of_reason in unranked.groupby("why", sort=False)
     ]
+    if sentence := neighbours(study):
+        pairs.append(("Places", sentence))
     if len(ranked):
         known = f"gaps are to the {reference(study, ranked_tasks(study))}"
         known += " in this world" if study.world else ""
