@@ -259,9 +259,7 @@ def _resampled_gaps(study: Study, methods: Sequence[str]) -> Array | None:
     samples = list[list[Array]]()
     for label, of in zip(methods, gaps, strict=True):
         runs = [of.get_group(task).to_numpy(np.float64) for task in tasks]
-        if not study.methods.stochastic[label]:  # its gaps are exact
-            runs = [each.mean(keepdims=True) for each in runs]
-        elif min(map(len, runs)) < MIN_VALUES:
+        if study.methods.stochastic[label] and min(map(len, runs)) < MIN_VALUES:
             return None
         samples.append(runs)
     return means_of_other_runs(samples)
