@@ -707,10 +707,25 @@ def place_intervals(means: Array) -> list[tuple[int, int]]:
 
 
 def are_separated(means: Array) -> list[bool]:
-    """Return whether the means of neighbours differ: of columns 0 and 1, of 1 and 2, and so on.
+    """Return whether each method is separated from the next one.
 
-    They differ if the 95 % interval of their difference over resamples leaves out 0. ``means`` has
-    shape ``(resamples, methods)``. The result has an entry for each method except the last.
+    Two methods are separated if the 95 % interval of the difference of their means over resamples
+    leaves out 0.
+
+    Parameters
+    ----------
+    means : ndarray, shape (resamples, methods)
+        The mean of each method in each resample, in the order of the ranking.
+
+    Returns
+    -------
+    list of bool
+        An entry for each method except the last.
+
+    Examples
+    --------
+    >>> are_separated(np.array([[0.1, 0.3, 0.3]]))
+    [True, False]
     """
     low, high = np.quantile(np.diff(means, axis=1), TAILS, axis=0)
     rounding = _rounding_of(means)
