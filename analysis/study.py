@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -43,7 +44,7 @@ from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, judge_seed, label_of, reference_seed, size_of, world_title
 from coartic.runs.record import execute_all, judge
 from coartic.runs.shipped import SHIPPED, open_results, results_folder
-from coartic.runs.store import explain_errors
+from coartic.runs.store import Store, explain_errors
 from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
 
@@ -182,7 +183,9 @@ def load(folder: str | Path, *, against: str = "") -> Study:
                 "interrupted, or has only a part of the runs. Repeat the `coartic run` command, "
                 "which makes the missing runs, or --include all parts in another folder."
             )
-        study = Study(folder, plan, store.made_with(), runs, store.marks(), imports=store.imports())
+        # A notebook can change its working folder.
+        place = folder if str(folder) == SHIPPED else folder.absolute()
+        study = Study(place, plan, store.made_with(), runs, store.marks(), imports=store.imports())
     return replace(study, against=_label_in(study, against)) if against else study
 
 
@@ -241,6 +244,20 @@ class Study:
     elsewhere: pd.DataFrame = field(default_factory=pd.DataFrame)
     """Rows like those of :attr:`methods`, for methods that have runs only in other worlds of the
     folder. Table ``not-ranked`` lists them, except searches for the optimum."""
+
+    @contextmanager
+    def _opened(self) -> Iterator[Store]:
+        """Open the results again, as long as the folder still has the runs of this study.
+
+        Raises CoarticError if it does not: what follows would belong to other runs.
+        """
+        with open_results(self.folder) as store:
+            if not {*vars(self)["stored"].run_id} <= store.asked_ids():
+                raise CoarticError(
+                    f"{self.folder} was changed since it was loaded, and lacks runs of then: load "
+                    "it again"
+                )
+            yield store
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a dict of the fields of the study for pickle, without cached values."""
@@ -377,7 +394,7 @@ class Study:
         """
         runs, tasks = self.stored, self.tasks.values()
         if self.is_noisy:
-            with open_results(self.folder) as store:
+            with self._opened() as store:
                 rewards = best_known(
                     runs,
                     tasks,
@@ -645,7 +662,7 @@ class Study:
         The columns are ``run_id``, ``order``, ``goal``, ``hand``, ``kind``, ``ticks`` and ``path``
         (docs/results.md).
         """
-        with open_results(self.folder) as store:
+        with self._opened() as store:
             solutions = store.solutions()
         return solutions[solutions.run_id.isin(self.stored.run_id)].reset_index(drop=True)
 
@@ -660,7 +677,7 @@ class Study:
             not stored.
         """
         ids = {*self.stored.run_id}
-        with open_results(self.folder) as store:
+        with self._opened() as store:
             for run_id, rewards in store.rewards():
                 if run_id in ids:  # others are in another world
                     yield run_id, rewards
@@ -813,7 +830,7 @@ class Study:
         """
         if part not in self._movements:
             ids = {*self.stored.run_id}
-            with open_results(self.folder) as store:
+            with self._opened() as store:
                 stored = store.movements(part, MAX_EXECUTED)
             self._movements[part] = {key: stored[key] for key in stored if key in ids}
         return self._movements[part].copy()

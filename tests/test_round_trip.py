@@ -269,6 +269,13 @@ def test_a_number_of_numpy_is_a_number():
         info.complete({"trials": object()})
 
 
+def test_a_default_of_numpy_is_a_number(own):
+    number = "__import__('numpy')."
+    fields = f"n: int = {number}int64(5)\npair: tuple[float, float] = ({number}float32(0.5), 1.0)"
+    info = registry([own(fields)])["mine"]
+    assert info.defaults == info.complete({}) == {"n": 5, "pair": [0.5, 1.0]}
+
+
 def test_names_of_settings_are_told_apart(suite, own):
     path = suite('grid = { value = [1, "1"] }', "'mine'")
     with pytest.raises(CoarticError, match="two settings have the name mine value=1 on ascending"):
@@ -442,3 +449,34 @@ def test_only_methods_that_run_are_asked_for_a_world(suite):
         with pytest.raises(CoarticError, match=r"model.base_weight is 4\.0; method 'posture-based"):
             plan_suite(planner, methods=methods, model={"base_weight": 4})
     assert math.isclose(plan[0].cell.model.base_weight, 4.0)
+
+
+# ---- Folders that a notebook has loaded ----
+
+
+def made_in(folder, seed=0, runs=2):
+    options = {"tasks": ["ascending"], "methods": ["random-search"], "trials": 30}
+    return perform(
+        plan_suite("quick", runs=runs, seed=seed, **options), folder, executor=InProcess()
+    )
+
+
+def test_a_study_stays_with_its_folder_when_the_working_folder_changes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    made_in(tmp_path / "res")
+    made_in(tmp_path / "other" / "res", seed=7)
+    study, expected = load("res"), load(tmp_path / "res").solutions
+    monkeypatch.chdir(tmp_path / "other")
+    assert study.solutions.equals(expected)
+    assert len(study.executed("ascending", "random-search").runs) == 2
+
+
+def test_a_folder_that_grows_can_be_read_on_and_one_that_shrinks_is_told(tmp_path):
+    folder = tmp_path / "res"
+    made_in(folder)
+    study, other = load(folder), load(folder)
+    made_in(folder, runs=3)
+    assert {*study.solutions.run_id} == {*study.runs.run_id}
+    made_in(folder, runs=1)
+    with pytest.raises(CoarticError, match="was changed since it was loaded"):
+        _ = other.solutions

@@ -451,7 +451,7 @@ def draw(
     from coartic.tasks.task import task_text
 
     for name in tasks or ():
-        if name == SHIPPED or Path(name).is_dir():
+        if name == SHIPPED or (name not in builtin_tasks() and Path(name).is_dir()):
             with open_results(given.results_folder(name)):  # explains what another folder lacks
                 raise CoarticError(
                     f"{name} is a results folder, not a task. `coartic draw {quote(name)} --run "

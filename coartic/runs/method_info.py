@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import PydanticSerializationError
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
@@ -282,7 +283,13 @@ def _validated(method: type[Method], parameters: Mapping[str, Any]) -> Any:
 def _dumped(method: type[Method], typed: Any) -> dict[str, Any]:
     """Return the parameters in an instance of ``method.Parameters`` as plain data."""
     _plain_parameters(method, typed.model_dump())  # mode json has None for some NaN
-    return _plain_parameters(method, typed.model_dump(mode="json"))
+    try:
+        data = typed.model_dump(mode="json", fallback=lambda value: value.tolist(), warnings=False)
+    except (PydanticSerializationError, AttributeError) as error:
+        raise CoarticError(
+            f"method {method.name!r}: a default must be plain data ({error_line(error)})"
+        ) from None
+    return _plain_parameters(method, data)
 
 
 def same_value(first: Any, second: Any) -> bool:

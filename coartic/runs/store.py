@@ -249,6 +249,10 @@ class Store:
         """
         return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
+    def asked_ids(self) -> set[str]:
+        """Return the ids of the runs of the plan that are stored in the folder."""
+        return {run_id for (run_id,) in self._rows("SELECT run_id FROM asked")}
+
     def count_outdated_runs(self) -> Counter[tuple[str, str, str]]:
         """Count the stored runs that another version of a planned method made.
 
