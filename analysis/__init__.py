@@ -18,6 +18,7 @@ _MODULES = {
     "check_hits": "coartic.analysis.recordings",
     "consistency": "coartic.analysis.recordings",
     "contexts_of_control": "coartic.analysis.control",
+    "contrast": "coartic.analysis.study",
     "ecdf": "coartic.analysis.running_times",
     "figure": "coartic.analysis.figures.plot",
     "interval": "coartic.analysis.words",

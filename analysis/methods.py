@@ -10,11 +10,13 @@ import itertools
 import json
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from itertools import starmap
 from typing import TYPE_CHECKING, Any
 
 from coartic.internal.text import one_line
 from coartic.learner.conditions import CONDITIONS, EVERY_CONDITION, INFORMED, METHOD_PREFIX
 from coartic.method import Information, Method, built_in_methods
+from coartic.runs.rows import LEARNER_ROWS, Ranked, row_names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,10 +31,8 @@ LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
 EC2, EC3 and EC4 use both arms."""
 INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
 """Ids of the informed learner, for one arm and for two arms."""
-RANKED_TOGETHER = {EC1: (EC4, EC3), INFORMED_LEARNERS[0]: INFORMED_LEARNERS[1:]}
-"""Maps the id of each learner for one arm to the ids of learners for two arms. The learner for one
-arm shares a row of the ranking with the first of these learners that has runs, but no task in
-common with it (:func:`ranked_as`)."""
+_TWO_ARMS = dict(LEARNER_ROWS.values())
+"""Maps the id of each learner for one arm to that of its row's learner for two arms."""
 RANDOM_SEARCH = "random-search"
 """Id of random search. Its solution is the best of many trials with random targets."""
 
@@ -237,10 +237,11 @@ def methods_of(
     shorts = Counter(title_of(info, short=True) for info in declared.values())
     for label, of_method in by_label.items():
         method_id, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
+        row = of_method.ranked_as.iloc[0]
         named = f" ({describe_setting(setting)})" if setting else ""
-        if label in varied.index:
+        if row in varied.index:
             default_note = f", {default_name(method_id)}" if not setting else ""
-            values = dict(zip(varied.columns, varied.loc[label], strict=True))
+            values = dict(zip(varied.columns, varied.loc[row], strict=True))
             named = f" ({describe_values(values)}{default_note})"
         info = declared[method_id]
         known = KNOWN_METHODS.get(method_id) if info.is_ours else None
@@ -248,15 +249,19 @@ def methods_of(
         default = method_id if setting else facts.ablation_of
         called = info if titles[title_of(info)] == 1 else method_id  # ids, if titles are the same
         briefly = info if shorts[title_of(info, short=True)] == 1 else method_id
-        parent = default if default in by_label and label not in varied.index else ""
+        titled = {
+            "title": title_of(called) + named,
+            "short_title": title_of(briefly, short=True) + named,
+        }
+        if "called" in of_method and len(names := {*of_method.called}) == 1 and "" not in names:
+            titled = dict.fromkeys(titled, *names)  # the suite gives the name
+        mark = MARK if method_id in marked else ""
+        parent = default if default in by_label and row not in varied.index else ""
         rows[label] = {
             "method_id": method_id,
             "condition": CONDITION_OF.get(method_id, ""),
             "setting": setting,
-            "title": title_of(called) + named + (MARK if method_id in marked else ""),
-            "short_title": title_of(briefly, short=True)
-            + named
-            + (MARK if method_id in marked else ""),
+            **{name: text + mark for name, text in titled.items()},
             "algorithm": one_line(facts.algorithm or (known.title if known else label)),
             "is_learner": method_id in LEARNERS,
             "is_search": method_id in SEARCHES,
@@ -267,12 +272,17 @@ def methods_of(
             "parent": parent,
             "style": LOOKS.get(method_id, ()) if known and not setting else (),
         }
+    row_of = dict(zip(runs.label, runs.ranked_as, strict=True))
     for label, joined in runs[runs.ranked_as != runs.label].groupby("ranked_as"):
-        second = rows[max(joined.label, key=[*KNOWN_METHODS].index)]
-        conditions = str(label).partition(" ")[2].replace("-informed", "")
-        names = {"title": f"{second['algorithm']} {conditions}"}
-        names["short_title"] = f"{second['short_title'].rpartition(' ')[0]} {conditions}"
-        rows[str(label)] = second | names
+        parts = [rows[part] for part in by_label if part in {*joined.label}]
+        conditions = [part["condition"].split("-")[0] for part in parts]
+        row = rows[str(label)] = {**parts[-1]}
+        row["parent"] = row_of.get(row["parent"], row["parent"])
+        for name in ("title", "short_title"):
+            if len(parts) > 1 and all(conditions):
+                row[name] = row[name].replace(conditions[-1], f"({', '.join(conditions)})")
+            if "called" in joined and (joined.called == label).all():
+                row[name] = str(label)
     for label, look in _looks_of(rows):
         rows[label]["style"] = look
     position = {name: number for number, name in enumerate(KNOWN_METHODS)}
@@ -300,18 +310,21 @@ def parameters_varied(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) ->
     Returns
     -------
     DataFrame
-        A row for each setting, indexed by its label, and a column for each parameter that has at
-        least two values. The parameter with the most values comes first. The rows are sorted by the
-        columns that contain only numbers, in ascending order. The frame is empty if the study does
-        not vary parameters.
+        A row for each setting, indexed by its row of the ranking, and a column for each parameter
+        that has at least two values. The parameter with the most values comes first. The rows are
+        sorted by the columns that contain only numbers, in ascending order. The frame is empty if
+        the study does not vary parameters.
     """
     import pandas as pd
 
     runs = runs[~runs.method.isin(SEARCHES)]
-    tasks = runs.groupby("label").task.nunique()
+    tasks = runs.groupby("ranked_as").task.nunique()
     if len({*runs.method}) != 1 or (tasks < runs.task.nunique()).any():
         return pd.DataFrame()
-    texts, (method,) = runs.drop_duplicates("label").set_index("label").parameters, {*runs.method}
+    texts, (method,) = (
+        runs.drop_duplicates("ranked_as").set_index("ranked_as").parameters,
+        {*runs.method},
+    )
     complete = [declared[method].defaults | json.loads(text) for text in texts]
     values = pd.DataFrame(complete, texts.index.astype(str), dtype=object)
     counts = values.map(repr).nunique().sort_values(ascending=False, kind="stable")
@@ -360,31 +373,17 @@ def _group_with(information: Collection[str]) -> str:
 
 
 def ranked_as(runs: pd.DataFrame) -> pd.Series:
-    """Return the name of the row of the ranking to which each run belongs.
+    """Return the name of the row of the ranking to which each run belongs (:func:`.row_names`).
 
-    The name is the label of the run (column ``label``), with one exception. The learner needs one
-    condition for tasks with one arm and another condition for tasks with two arms
-    (:data:`RANKED_TOGETHER`). If both conditions have runs with default parameters, but no task in
-    common, the two conditions share a row, and these runs get the name of this row
-    (:func:`joined_label`). Of several conditions for two arms, the first that fits is used. The
-    result has the index of ``runs``.
+    ``runs`` has columns ``method``, ``setting`` and ``task``, and ``called`` if its suite names
+    runs. The result has the index of ``runs``.
     """
-    tasks = {label: {*of_method.task} for label, of_method in runs.groupby("label")}
-    names = runs.label
-    for one, others in RANKED_TOGETHER.items():
-        for two in others:
-            if one in tasks and two in tasks and not tasks[one] & tasks[two]:
-                names = names.mask(names.isin([one, two]), joined_label(one, two))
-                break
-    return names
+    import pandas as pd
 
-
-def joined_label(one: str, two: str) -> str:
-    """Return the label of the row that two learners share, such as ``dual-process (EC1, EC4)``.
-
-    ``one`` and ``two`` are the ids of the learners for one arm and for two arms.
-    """
-    return f"{METHOD_PREFIX.rstrip('/')} ({CONDITION_OF[one]}, {CONDITION_OF[two]})"
+    names = ["method", "setting", "task", "called"]
+    columns = [runs[name].tolist() if name in runs else [""] * len(runs) for name in names]
+    ranked = [*starmap(Ranked, zip(*columns, strict=True))]
+    return pd.Series(row_names(ranked), runs.index, name="ranked_as")
 
 
 def _pairs_of(group: str) -> list[tuple[str, str]]:
@@ -407,17 +406,14 @@ def _looks_of_built_in() -> dict[str, tuple[str, str]]:
     :class:`.Facts`). Each method takes the first free pair of its group (:func:`_pairs_of`). The
     methods choose in the order of :data:`KNOWN_METHODS`, but the corrective process alone, which
     has no curve, chooses after the others, and learners for one arm choose last: each
-    takes the first free pair with the colour of the first learner for two arms in
-    :data:`RANKED_TOGETHER`.
+    takes the first free pair with the colour of the learner for two arms of its row.
     """
     looks, free = dict[str, tuple[str, str]](), {group: _pairs_of(group) for group in GROUPS}
     headlines = {name: each for name, each in KNOWN_METHODS.items() if each.facts.headline}
     without_curve = {name for name in headlines if name.startswith("corrective-alone/")}
-    for name in sorted(
-        headlines, key=lambda name: (name in RANKED_TOGETHER, name in without_curve)
-    ):
+    for name in sorted(headlines, key=lambda name: (name in _TWO_ARMS, name in without_curve)):
         pairs = free[_group_with({kind.value for kind in headlines[name].information})]
-        colors = [looks[two][0] for two in RANKED_TOGETHER.get(name, ())[:1]]
+        colors = [looks[_TWO_ARMS[name]][0]] if name in _TWO_ARMS else []
         looks[name] = next(pair for pair in pairs if not colors or pair[0] in colors)
         pairs.remove(looks[name])
     return looks

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 
 from coartic.analysis.frames import DUPLICATE, SCORES, checked, refuse_rows, scored
 from coartic.analysis.standings import cells_of, ranked_tasks, runs_by_method
-from coartic.analysis.study import Study, load, shared_cells, solved
+from coartic.analysis.study import Study, improvements, load, shared_cells, solved
 from coartic.errors import CoarticError
 from coartic.estimates import FEWER_RESAMPLES, IN_CACHE, MIN_VALUES, SEED, TAILS, Estimate, slices
 from coartic.internal.limits import brief_value, real_array
@@ -185,45 +184,6 @@ def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
             rows = rng.multinomial(size, np.full(size, 1 / size), part.stop - part.start)
             drawn[part, end - size : end] = rows
     return drawn
-
-
-@lru_cache(maxsize=4)
-def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
-    """Return the learning curve of each run: the trials with a new best reward.
-
-    Returns
-    -------
-    dict of str to (ndarray, ndarray)
-        Maps the id of each run to two arrays, shape ``(n,)`` each, for the n trials whose reward
-        was higher than that of each earlier trial: the numbers of these trials, counted from 1, and
-        their rewards (negative ticks). Runs without stored rewards of trials are left out. The dict
-        is cached: do not change it.
-    """
-    by_run = {}
-    for run_id, rewards in study.rewards():
-        best = np.fmax.accumulate(np.append(-np.inf, rewards))  # fmax ignores NaN
-        trials = 1 + np.flatnonzero(best[1:] > best[:-1])
-        by_run[run_id] = trials.astype(np.float64), best[trials]
-    return by_run
-
-
-def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
-    """Return the best reward of a run after each given number of trials.
-
-    Parameters
-    ----------
-    steps : (ndarray, ndarray)
-        Learning curve of the run: its entry in the dict of :func:`improvements`.
-    trials : array_like of int
-        Numbers of trials, an array of any shape.
-
-    Returns
-    -------
-    ndarray, of the shape of ``trials``
-        Best rewards so far, in negative ticks. They are NaN before the first completed trial.
-    """
-    numbers, rewards = steps
-    return np.asarray(np.append(math.nan, rewards)[np.searchsorted(numbers, trials, "right")])
 
 
 @lru_cache(maxsize=4)

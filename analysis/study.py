@@ -11,15 +11,18 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import numpy as np
 import pandas as pd
+from pydantic import Field, ValidationError
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences, initial_hands
+from coartic.analysis.contrasts import EXACT, QUANTITIES, Values, check_contrasts, rows_of
+from coartic.analysis.frames import shares
 from coartic.analysis.methods import methods_of, parameters_varied, ranked_as
 from coartic.analysis.optima import (
     FRESH_EXECUTIONS,
@@ -32,7 +35,9 @@ from coartic.analysis.optima import (
 from coartic.analysis.signatures import SIGNATURES, Solutions
 from coartic.analysis.words import listed, slugs, titled_apart
 from coartic.errors import CoarticError
-from coartic.internal.text import pluralize, unknown
+from coartic.internal.text import plain, pluralize, unknown
+from coartic.internal.toml_files import read_toml
+from coartic.internal.validation import FileData, explain
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.method import Information
 from coartic.model import WORLD, MotionModel
@@ -40,10 +45,12 @@ from coartic.motion.execution import initial_reward
 from coartic.motion.initial_hands import best_hands, ranked_sequences
 from coartic.motion.solution import corrective_movements
 from coartic.robot import Array
+from coartic.runs.contrasts import Contrast, Place, Registered
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, judge_seed, label_of, reference_seed, size_of, world_title
 from coartic.runs.record import execute_all, judge
-from coartic.runs.shipped import SHIPPED, open_results, results_folder
+from coartic.runs.rows import places_of
+from coartic.runs.shipped import SHIPPED_SUITES, open_results, results_folder
 from coartic.runs.store import Store, explain_errors
 from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
@@ -149,8 +156,9 @@ def load(folder: str | Path, *, against: str = "") -> Study:
     Parameters
     ----------
     folder : str or pathlib.Path
-        The folder, or the string ``"shipped"`` for the shipped results of suite ``comparison``. A
-        folder of your own with this name is ``"./shipped"``, or a :class:`pathlib.Path`.
+        The folder, or the string ``"shipped"`` or ``"shipped-families"`` for the shipped results of
+        suites ``comparison`` and ``families``. A folder of your own with such a name is
+        ``"./shipped"``, or a :class:`pathlib.Path`.
     against : str
         Id, label or title of a method of the folder, with which table ``differences`` compares the
         other methods. By default, :func:`.list_differences` chooses the method.
@@ -184,8 +192,9 @@ def load(folder: str | Path, *, against: str = "") -> Study:
                 "which makes the missing runs, or --include all parts in another folder."
             )
         # A notebook can change its working folder.
-        place = folder if str(folder) == SHIPPED else folder.absolute()
-        study = Study(place, plan, store.made_with(), runs, store.marks(), imports=store.imports())
+        place = folder if str(folder) in SHIPPED_SUITES else folder.absolute()
+        study = Study(place, plan, store.made_with(), runs, store.marks(), imports=store.imports(),
+                      asked=store.contrasts())  # fmt: skip
     return replace(study, against=_label_in(study, against)) if against else study
 
 
@@ -241,6 +250,8 @@ class Study:
     imports: dict[str, list[str]] = field(default_factory=dict)
     """Maps the id of a method from a file to the packages that the file imports, as strings such as
     ``numpy 2.1.0``."""
+    asked: Sequence[Registered] = ()
+    """Contrasts of the folder, which :attr:`contrasts` answers."""
     elsewhere: pd.DataFrame = field(default_factory=pd.DataFrame)
     """Rows like those of :attr:`methods`, for methods that have runs only in other worlds of the
     folder. Table ``not-ranked`` lists them, except searches for the optimum."""
@@ -297,7 +308,7 @@ class Study:
                 self.marks,
                 self.against if self.against in here else "",
                 {name: self.imports[name] for name in self.imports if name in used},
-                methods.loc[others],
+                elsewhere=methods.loc[others],
             )
         return studies
 
@@ -342,11 +353,11 @@ class Study:
         The path is relative to the working folder. If the results folder is not inside the working
         folder, the result is only the name of the results folder.
         """
-        if str(self.folder) == SHIPPED:
-            return SHIPPED
+        if str(self.folder) in SHIPPED_SUITES:
+            return str(self.folder)
         path = Path(os.path.abspath(self.folder))  # without ..
         name = str(path.relative_to(Path.cwd()) if Path.cwd() in path.parents else path.name)
-        return quote(f"./{name}" if name == SHIPPED else name)
+        return quote(f"./{name}" if name in SHIPPED_SUITES else name)
 
     @property
     def question(self) -> tuple[str, str]:
@@ -822,6 +833,101 @@ class Study:
         values_of_all: pd.Series = pd.concat(parts)
         return values_of_all.reindex(self.runs.index)
 
+    def amounts(
+        self, quantity: str, task: str, method: str, *, after: int | None = None
+    ) -> pd.Series:
+        """Return a quantity of contrasts for each run of a method on a task.
+
+        Parameters
+        ----------
+        quantity : str
+            A quantity (:func:`contrast`), in ticks, in %, or in the unit of a signature.
+        task, method : str
+            Name of the task, and label of the method.
+        after : int, optional
+            Number of trials after which the best trial so far is read, for ``ticks``, ``saved``,
+            ``gap`` and ``share``. It does not change methods without trials.
+
+        Returns
+        -------
+        Series
+            Values with the index of the runs of the cell. A value is NaN for a failed run, and for
+            a run that has no such value.
+
+        Raises
+        ------
+        CoarticError
+            The study has no such runs or several worlds, or no quantity has this name.
+        """
+        if quantity in SIGNATURES:
+            return self.signature(quantity, task, method)
+        if quantity not in QUANTITIES:
+            raise CoarticError(unknown("quantity", quantity, QUANTITIES))
+        runs, alone = shared_cells(self)[task, method], self.corrective_best[task]
+        values = runs.value.astype(np.float64)
+        if after is not None and runs.budget.notna().all():
+            curves = improvements(self)
+            steps = [curves.get(run_id, (np.empty(0), np.empty(0))) for run_id in runs.run_id]
+            values = pd.Series([float(best_after(of, after)) for of in steps], runs.index)
+        if quantity in EXACT and self.is_noisy:
+            executed = self.executed(task, method)
+            ticks = {
+                run_id: float(run.ticks)
+                for run_id, run in zip(executed.run_ids, executed.runs, strict=True)
+            }
+            values = -runs.run_id.map(ticks).astype(np.float64)
+            best = best_hands(self.tasks[task], self.models[task])
+            alone = -float(best[1]) if best else math.nan
+        match quantity.split()[0]:
+            case "saved":
+                return 100 * (1 - values / alone)
+            case "gap":
+                best_known = runs.best_known.astype(np.float64)
+                return pd.Series(100 * relative_gap(values, best_known), runs.index)
+            case "share":
+                scored = runs if after is None else runs.assign(reward=values)
+                return 100 * shares(scored[values.notna()]).reindex(runs.index)
+        return -values
+
+    def _values_of(self, asked: Contrast, place: Place) -> Values:
+        """Return the values of the runs of a place, in the quantity of a contrast."""
+        study, key = self.worlds[place.world], (place.task, place.label)
+        if key not in shared_cells(study):
+            return Values(np.empty(0), True, [])
+        runs = shared_cells(study)[key]
+        failed = bool(runs.value.isna().any())
+        if failed:
+            return Values(np.full(len(runs), np.nan), failed, runs.run_id.tolist())
+        amounts = study.amounts(asked.quantity, *key, after=asked.after)
+        if asked.quantity in (*SIGNATURES, *EXACT):
+            amounts = amounts.iloc[:MAX_EXECUTED]
+        return Values(amounts.to_numpy(np.float64), failed, runs.run_id.tolist())
+
+    @_Copied
+    def contrasts(self) -> pd.DataFrame:
+        """The answers to the contrasts of the folder, with a row for each cell.
+
+        A cell has the tasks of a family in a world. Columns:
+
+        - ``contrast``, ``says``, ``quantity``, ``expected``: the question;
+        - ``asked``: when it was asked: *before its runs*, or *after k of its runs*;
+        - ``world`` and ``family`` of the cell. The rows of *all families* are not tested. A task of
+          no family has a row of its own: ``family`` is its name, ``median`` is missing, and the
+          interval of ``mean`` is over runs;
+        - ``tasks``: number of planned tasks; ``n``: number of those with a value; ``yes`` and
+          ``equal``: how many of the n lie on the expected side of the bound, and on the bound
+          (above 0, and 0, if nothing is expected);
+        - ``median`` and ``mean`` over tasks, with the ends of their 95 % intervals;
+        - ``p`` of the exact two-sided sign test, and ``p_holm``, corrected over the cells of the
+          contrast that the suite plans with at least six tasks;
+        - ``verdict``: *shown*, *opposite shown*, *open* or *not tested*; empty without expectation;
+        - ``dropped``: tasks with failed or missing runs; ``not_applicable``: tasks on which a run
+          has no such value;
+        - ``note``: what limits the row;
+        - ``run_ids`` of the runs.
+        """
+        return answers(self, self.asked)
+
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return a dict that maps ids of runs to the stored movements of solutions or replays.
 
@@ -864,6 +970,116 @@ class Study:
         return {name: task for name, task in self.tasks.items() if name not in left_out}
 
 
+_ANSWER = (
+    *("contrast", "says", "quantity", "expected", "asked", "world", "family", "tasks", "n", "yes"),
+    *("equal", "median", "median_low", "median_high", "mean", "mean_low", "mean_high", "p"),
+    *("p_holm", "verdict", "dropped", "not_applicable", "note", "run_ids"),
+)
+
+
+def answers(study: Study, asked: Sequence[Registered]) -> pd.DataFrame:
+    """Return the answers to contrasts (:attr:`Study.contrasts`)."""
+    own = [job for job in study.plan if job.of_suite]
+    places, rows = places_of(own), list[dict[str, Any]]()
+    cells = study.stored.groupby(["task", "method", "setting", "world"]).date
+    dates = {key: of_cell.astype(str).tolist() for key, of_cell in cells}
+    keys = [(job.cell.task.name, job.cell.method.name, job.cell.setting, job.cell.world)
+            for job in own]  # fmt: skip
+    for record in asked:
+        of_runs = [
+            date
+            for key, place in zip(keys, places, strict=True)
+            if record.contrast.terms_at(place)
+            for date in dates.get(key, ())
+        ]
+        count = max(record.runs, sum(date < record.date for date in of_runs))
+        words = "after all its runs" if count == len(of_runs) else f"after {count} of its runs"
+        words = words if count else "before its runs"
+        words += "" if record.is_asked else ", and changed or left out since"
+        for row in rows_of(record.contrast, places, study._values_of, record.cells):
+            rows.append(row | {"asked": words})
+    return pd.DataFrame(rows, columns=[*_ANSWER])
+
+
+def contrast(
+    study: Study,
+    quantity: str,
+    weights: Mapping[str, float] | Sequence[Mapping[str, Any]],
+    **keys: Any,
+) -> pd.DataFrame:
+    """Answer a question about a study, as a table ``[[contrasts]]`` of its suite would ask it.
+
+    Parameters
+    ----------
+    study : Study
+        Results of a folder (:func:`load`), in one world or several.
+    quantity : str
+        What is compared: ``ticks``, ``saved`` (ticks saved, in % of those of the corrective process
+        with its best hands), ``gap`` and ``share`` (in %), ``ticks exact`` and ``saved exact``
+        (executed once without motor noise), or the name of a signature.
+    weights : mapping of str to float, or sequence of mapping
+        Weight of each method, named as its row of the ranking; or, across worlds, a list of tables
+        with ``method``, ``weight`` and ``world``.
+    **keys
+        Further keys of the table: ``expected``, ``tasks``, ``families``, ``worlds``, ``after``.
+
+    Returns
+    -------
+    DataFrame
+        A row for each cell (:attr:`Study.contrasts`).
+
+    Raises
+    ------
+    CoarticError
+        A name, a quantity or a key is wrong.
+
+    Examples
+    --------
+    >>> study = load("shipped-families")  # doctest: +SKIP
+    >>> weights = {"policy-gradient": 1, "learner": -1}  # doctest: +SKIP
+    >>> contrast(study, "saved", weights, expected="above 0").verdict  # doctest: +SKIP
+    """
+    table = {"name": "contrast", "says": "", "quantity": quantity, "weights": weights, **keys}
+    try:
+        asked = Contrast.model_validate(table)
+    except ValidationError as error:
+        raise CoarticError(explain(error, Contrast.model_fields)) from None
+    return answers(study, later(study, [asked]))
+
+
+def later(study: Study, contrasts: Sequence[Contrast]) -> list[Registered]:
+    """Return contrasts that are asked about finished runs.
+
+    Raises CoarticError if a contrast does not fit the plan of the study.
+    """
+    checked = check_contrasts(contrasts, places_of(job for job in study.plan if job.of_suite))
+    return [Registered(asked, cells, True, _LATE, 0) for asked, cells in checked]
+
+
+class _File(FileData):
+    """A file with questions about finished runs."""
+
+    contrasts: Annotated[tuple[Contrast, ...], Field(min_length=1)]
+
+
+def with_contrasts(study: Study, path: Path) -> Study:
+    """Return a study that also answers the contrasts of a file (TOML).
+
+    Raises CoarticError if the file cannot be read, or a contrast does not fit the study.
+    """
+    try:
+        asked = _File.model_validate(read_toml(path)).contrasts
+        return replace(study, asked=[*study.asked, *later(study, asked)])
+    except ValidationError as error:
+        raise CoarticError(f"{plain(str(path))}: {explain(error, ['contrasts'])}") from None
+    except CoarticError as error:
+        raise CoarticError(f"{plain(str(path))}: {error}") from None
+
+
+_LATE = "later"
+"""Date of a contrast about finished runs: it comes after each date."""
+
+
 def shared_cells(study: Study) -> dict[CellKey, pd.DataFrame]:
     """Return the frames of :attr:`Study.cells` themselves, for tables: a copy of each takes long.
 
@@ -872,13 +1088,53 @@ def shared_cells(study: Study) -> dict[CellKey, pd.DataFrame]:
     return study._cells
 
 
+@lru_cache(maxsize=4)
+def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
+    """Return the learning curve of each run: the trials with a new best reward.
+
+    Returns
+    -------
+    dict of str to (ndarray, ndarray)
+        Maps the id of each run to two arrays, shape ``(n,)`` each, for the n trials whose reward
+        was higher than that of each earlier trial: the numbers of these trials, counted from 1, and
+        their rewards (negative ticks). Runs without stored rewards of trials are left out. The dict
+        is cached: do not change it.
+    """
+    by_run = {}
+    for run_id, rewards in study.rewards():
+        best = np.fmax.accumulate(np.append(-np.inf, rewards))  # fmax ignores NaN
+        trials = 1 + np.flatnonzero(best[1:] > best[:-1])
+        by_run[run_id] = trials.astype(np.float64), best[trials]
+    return by_run
+
+
+def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
+    """Return the best reward of a run after each given number of trials.
+
+    Parameters
+    ----------
+    steps : (ndarray, ndarray)
+        Learning curve of the run: its entry in the dict of :func:`improvements`.
+    trials : array_like of int
+        Numbers of trials, an array of any shape.
+
+    Returns
+    -------
+    ndarray, of the shape of ``trials``
+        Best rewards so far, in negative ticks. They are NaN before the first completed trial.
+    """
+    numbers, rewards = steps
+    return np.asarray(np.append(math.nan, rewards)[np.searchsorted(numbers, trials, "right")])
+
+
 def ending_of(study: Study) -> str:
     """Return the suffix of ids for the world of a study, such as ``-motor-noise-0-01``.
 
     The ids are those of tables, figures and sections of the page. The suffix is empty for the
-    paper's world. Raises CoarticError for a study of several worlds.
+    paper's world, and for a study of several worlds.
     """
-    return f"-{slugs([study.world])[study.world]}" if study.world else ""
+    worlds = [*study.worlds]
+    return f"-{slugs(worlds)[worlds[0]]}" if len(worlds) == 1 and worlds[0] else ""
 
 
 def _stored_of(study: Study) -> pd.DataFrame:

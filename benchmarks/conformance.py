@@ -26,13 +26,13 @@ from coartic import (
 )
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
-from coartic.internal.text import pluralize
+from coartic.internal.text import describe_parameters, pluralize
 from coartic.method import METERED
 from coartic.motion.execution import execute_many
 from coartic.motion.solution import goals_without_target, next_action
 from coartic.motion.trials import compiled_task, noise_draws, noise_seed
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of, describe_parameters
+from coartic.runs.plan import Job, cell_of
 from coartic.runs.record import Row
 from coartic.tasks.task import check_task
 

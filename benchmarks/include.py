@@ -29,7 +29,7 @@ from coartic.errors import CoarticError
 from coartic.internal.text import pluralize
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, hash_of
-from coartic.runs.shipped import SHIPPED, open_shipped, results_folder
+from coartic.runs.shipped import SHIPPED, SHIPPED_SUITES, open_shipped, results_folder
 from coartic.runs.store import Store, open_store, open_store_for_writing
 
 
@@ -101,8 +101,9 @@ def include_folders(
         sources: dict[str, Store] = {}
         for folder in map(results_folder, folders):
             name = str(folder)
-            if name == SHIPPED:
-                sources[name] = stack.enter_context(open_shipped(plan[0].suite))
+            if name in SHIPPED_SUITES:
+                suite = plan[0].suite if name == SHIPPED else SHIPPED_SUITES[name]
+                sources[name] = stack.enter_context(open_shipped(suite))
                 continue
             if folder.resolve() == out.resolve():
                 raise CoarticError(f"{name} cannot include itself: choose another --out")
@@ -207,7 +208,9 @@ def _join(
             runs += 1
         if runs:
             cell = replace(job.cell, method=methods[job.cell.method.name])
-            jobs.setdefault(digest, replace(plan[0], cell=cell, numbers=range(runs)))
+            of_suite = job.of_suite and digest in asked
+            own = replace(plan[0], called=job.called, of_suite=of_suite)
+            jobs.setdefault(digest, replace(own, cell=cell, numbers=range(runs)))
     _warn_of_gaps(asked, plans, jobs)
     return list(jobs.values())
 

@@ -35,11 +35,13 @@ from coartic.internal.limits import (
     check_limits,
     plain_values,
 )
-from coartic.internal.text import pluralize, unknown
+from coartic.internal.text import describe_parameters, pluralize, unknown
 from coartic.internal.validation import FileData, described_error, explain
 from coartic.model import PAPER, MotionModel, differences
+from coartic.runs.contrasts import Contrast
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of, describe_parameters, tasks_by_name
+from coartic.runs.plan import Job, cell_of, tasks_by_name
+from coartic.runs.rows import LEARNER_ROWS, places_of
 from coartic.tasks.families import (
     instance_of,
     is_file,
@@ -194,6 +196,9 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     if not request.methods or WILDCARD in request.methods:
         left_out = set()
     jobs = [*_suite_jobs(suite, request, registered, own, task_named, job, left_out)]
+    jobs = [replace(made, of_suite=made.cell.task.name not in own) for made in jobs]
+    _check_names(jobs)
+    contrasts = _checked_contrasts(suite, request, registered, task_named)
     of_suite = dict.fromkeys(planned.cell.method.name for planned in jobs)
     asked = {name: named.get(name, [*of_suite]) for name in request.methods}
     asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
@@ -206,7 +211,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     worlds = _worlds_beside(jobs, request)
     usual = [world for world in worlds if world == PAPER] or worlds
     jobs += [
-        job(task, method, world=world)
+        replace(job(task, method, world=world), of_suite=False)
         for task, method in itertools.product(tasks.values(), methods)
         if (task.name in own or method.name not in of_suite)
         and (task.name, method.name) not in cells
@@ -240,9 +245,46 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
             request.trials, plan(suite, request.model_copy(update={"trials": None}), registered)
         )
     jobs = _distinct_jobs([planned for planned in chosen if planned.numbers])
-    if own or suite in suites().values():
-        return jobs
-    return [replace(planned, question=(suite.title, suite.description)) for planned in jobs]
+    is_asked = not own and suite not in suites().values()
+    question = (suite.title, suite.description) if is_asked else None
+    return [replace(planned, question=question, contrasts=contrasts) for planned in jobs]
+
+
+def _checked_contrasts(
+    suite: Suite, request: Request, registered: Registry, task_named: TaskNamed
+) -> tuple[tuple[Contrast, int], ...]:
+    """Return the contrasts of a suite, checked against all its blocks, with their cells."""
+    if not suite.contrasts:
+        return ()
+    from coartic.analysis.contrasts import check_contrasts  # SciPy, for suites that ask
+
+    whole = request.model_copy(update={"model": None})
+    job = partial(_job_of, suite, whole)
+    places = places_of(_suite_jobs(suite, whole, registered, (), task_named, job, ()))
+    try:
+        return check_contrasts(suite.contrasts, places)
+    except CoarticError as error:
+        raise CoarticError(f"suite {suite.name!r}, {error}") from None
+
+
+def _check_names(jobs: Iterable[Job]) -> None:
+    """Raise CoarticError if a block's name (``as``) is that of another row, or of two settings."""
+    jobs = [*jobs]
+    labels, others = dict[tuple[str, str, str], str](), {job.cell.label for job in jobs}
+    others |= {*LEARNER_ROWS, *(job.cell.method.name for job in jobs)}
+    for job in jobs:
+        cell = job.cell
+        if job.called in others:
+            raise CoarticError(
+                f"as = {job.called!r} is the name of another row: choose another name"
+            )
+        if job.called:
+            first = labels.setdefault((job.called, cell.task.name, cell.world), cell.label)
+            if first != cell.label:
+                raise CoarticError(
+                    f"as = {job.called!r} names two settings on {cell.task.name}: {first} and "
+                    f"{cell.label}; it must name one"
+                )
 
 
 def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
@@ -449,7 +491,7 @@ def _suite_jobs(
                     chosen = world or _world_of(request)
                     reason = method.refuses(chosen) or method.inapplicable_reason(task, parameters)
                     if reason is None:
-                        yield job(task, method, parameters, block.runs, chosen)
+                        yield job(task, method, parameters, block.runs, chosen, block.called)
                     elif not is_open and method.name not in left_out:
                         raise CoarticError(
                             f"{reason}; name in a block only methods that apply to all of its tasks"
@@ -464,6 +506,7 @@ def _job_of(
     parameters: Mapping[str, Any] | None = None,
     runs: int | None = None,
     world: MotionModel | None = None,
+    called: str | None = None,
 ) -> Job:
     """Return the job of a method with parameters on a task.
 
@@ -488,7 +531,7 @@ def _job_of(
     numbers = numbers if method.stochastic else range(numbers.start, 1)
     limit_s = request.time_limit_s or suite.time_limit_s
     due = min(filter(None, (trials, request.trial_budget)), default=None)
-    return Job(cell, request.seed, numbers, limit_s, suite.name, due)
+    return Job(cell, request.seed, numbers, limit_s, suite.name, due, called or "")
 
 
 def _why_nothing_runs(

@@ -11,7 +11,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any
 
-from pydantic import Field, PlainValidator, ValidationError
+from pydantic import ConfigDict, Field, PlainValidator, ValidationError
 from pydantic_core import PydanticCustomError
 
 from coartic import CoarticError, Task, builtin_tasks, parse_task
@@ -21,7 +21,8 @@ from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, described_error, explain
 from coartic.model import WORLD, MotionModel, check_model
 from coartic.robot import Finite
-from coartic.runs.shipped import SHIPPED
+from coartic.runs.contrasts import Contrast, Term
+from coartic.runs.shipped import SHIPPED_SUITES
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.families import named_by, shipped_families
 from coartic.tasks.task import MAX_NAME_LENGTH, NAME_PATTERN
@@ -104,6 +105,11 @@ class Move(FileData):
 class _Block(FileData):
     """A block of a suite: methods on tasks, with a grid of parameters."""
 
+    model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
+
+    called: Annotated[Line, Field(min_length=1)] | None = Field(None, alias="as")
+    """Key ``as``: name of the runs of the block in rankings, figures and contrasts, such as
+    ``CMA-ES, small population``. On each task, the block then has only one setting."""
     tasks: _Names
     """Names of tasks, paths of task files, or ranges of instances such as ``long/v1/i000..i039``.
     The entry ``"*"`` stands for all shipped tasks and all tasks that a command adds."""
@@ -153,6 +159,8 @@ class Suite(FileData):
     method that are performed side by side."""
     blocks: Annotated[tuple[_Block, ...], _SOME]
     """Tables ``[[blocks]]``, each with its tasks and methods."""
+    contrasts: tuple[Contrast, ...] = ()
+    """Tables ``[[contrasts]]``: questions that the suite asks about its methods."""
 
 
 _TAKEN_BY = {
@@ -197,7 +205,7 @@ def kind_of(name: str) -> str:
         return "shipped family"
     if name.endswith(".py"):
         return "method file"
-    if name == SHIPPED:
+    if name in SHIPPED_SUITES:
         return "results folder"
     if not name.endswith(".toml"):
         closed = os.path.isdir(name) and not os.access(name, os.X_OK)
@@ -263,7 +271,8 @@ def _read_suite(path: Path) -> Suite:
     try:
         return Suite.model_validate({"name": path.stem, **content})
     except ValidationError as error:
-        keys = [*Suite.model_fields, *_Block.model_fields, *Move.model_fields]
+        kinds = (Suite, _Block, Move, Contrast, Term)
+        keys = [field.alias or key for kind in kinds for key, field in kind.model_fields.items()]
         raise CoarticError(f"{plain(str(path))}: {explain(error, keys)}") from None
 
 

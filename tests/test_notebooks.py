@@ -43,7 +43,7 @@ def test_shipped_results_are_read_as_a_study(tmp_path, monkeypatch):
     (alone,) = study.cells["ascending", "corrective-alone/best-hands"].reward
     assert alone == max(study.sequences("ascending").reward.dropna())
     ranked = ranking(study.runs[study.runs.run == 0])
-    assert ranked.why["dual-process (EC1, EC4)"] == ""
+    assert ranked.why["learner"] == ""
     assert ranked.why["dual-process/EC3"] == "2 of 4 tasks"
     assert len(next(study.rewards())[1]) > 0
     assert os.listdir("shipped") == []

@@ -186,7 +186,7 @@ def test_tests_and_differences_are_of_values():
     ranked = TABLES["ranking"](noise)
     assert ranked.loc["mine", ["better", "worse"]].tolist() == [1, 0]
     (row,) = TABLES["differences"](noise).query("against == 'mine'").to_dict("records")
-    assert row["method"] == "dual-process/EC1"
+    assert row["method"] == "learner"
     assert row["difference"] == pytest.approx(3 / BEST)
     rows = TABLES["methods"](noise)
     assert rows.reward[f"{TASK} mine"] == pytest.approx(-307.45)

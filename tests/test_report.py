@@ -18,7 +18,7 @@ from coartic.analysis.figures import drawings, plot
 from coartic.analysis.figures.plot import picture
 from coartic.analysis.report import build, sections
 from coartic.analysis.report.build import stamp, write_report
-from coartic.analysis.report.sections import SECTIONS, attempt, finding
+from coartic.analysis.report.sections import QUESTIONS, SECTIONS, attempt, finding
 from coartic.analysis.study import load
 from coartic.analysis.words import id_of
 from coartic.internal.files import LISTING
@@ -81,7 +81,7 @@ def test_page_and_citation_name_the_versions_that_made_the_runs(coartic, traced,
 
 
 def test_each_figure_is_in_a_section():
-    shown = {id_of(draw) for section in SECTIONS for draw in section.figures}
+    shown = {id_of(draw) for section in (QUESTIONS, *SECTIONS) for draw in section.figures}
     assert not {*FIGURES} - shown, "add these figures to a Section of analysis/report/sections.py"
 
 

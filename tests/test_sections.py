@@ -23,7 +23,7 @@ from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of
 
 ONE, TWO = "ascending", "two-armed-1"
 EC1, EC4, CMA = "dual-process/EC1", "dual-process/EC4", "cma-es/bandit"
-PLAN, BOTH = "trajectory-optimisation/path-length", "dual-process (EC1, EC4)"
+PLAN, BOTH = "trajectory-optimisation/path-length", "learner"
 NONE = math.nan
 
 

@@ -25,7 +25,7 @@ from coartic.analysis.words import number
 from tests.support.made_up import MadeUp, change_runs, made_up_optima, row, runs_of, study_of
 from tests.support.made_up import study_of_rewards as study
 
-EC1, BOTH = "dual-process/EC1", "dual-process (EC1, EC4)"
+EC1, BOTH = "dual-process/EC1", "learner"
 LEARNER = {("ascending", EC1): [-300, -301, -302, -303],
            ("two-armed-1", "dual-process/EC4"): [-480, -481, -482, -483]}  # fmt: skip
 CMA = {("ascending", "cma-es/bandit"): [-293, -294, -293, -294],
@@ -33,12 +33,12 @@ CMA = {("ascending", "cma-es/bandit"): [-293, -294, -293, -294],
 
 
 def test_conditions_for_one_arm_and_for_two_are_ranked_as_one():
-    """EC1 with EC4, or with EC3 where EC4 did not run; EC1 alone if it ran on both tasks itself."""
+    """EC1 with EC4, or one of them; EC1 alone if it ran on both tasks itself."""
     better = {("two-armed-1", "dual-process/EC3"): [-470, -471, -470, -471]}
     rows = standings.standings(study(LEARNER | better))
     assert rows.why.to_dict() == {BOTH: "", "dual-process/EC3": "1 of 2 tasks"}
-    without = {cell: of for cell, of in LEARNER.items() if cell[1] == EC1} | better
-    assert standings.standings(study(without)).why.to_dict() == {"dual-process (EC1, EC3)": ""}
+    one = {cell: of for cell, of in LEARNER.items() if cell[1] == EC1}
+    assert standings.standings(study(one)).why.to_dict() == {BOTH: ""}
     alone = standings.standings(study(LEARNER | {("two-armed-1", EC1): [-500] * 4}))
     assert alone.why.to_dict() == {EC1: "", "dual-process/EC4": "1 of 2 tasks"}
 
@@ -214,7 +214,7 @@ def test_a_study_of_numbers_of_trials_is_ranked_whole():
     seen = with_settings(*settings)
     assert standings.ranking_budget(seen) is None
     rows = TABLES["ranking"](seen)
-    assert rows.index.tolist() == [f"{EC1} {setting}" for setting in settings[::-1]]
+    assert rows.index.tolist() == [f"learner {setting}" for setting in settings[::-1]]
 
 
 def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
@@ -226,7 +226,7 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     change_runs(seen, "trials", 1, seen.runs.method == "corrective-alone/given")
     seen = MadeUp(seen, optima=made_up_optima("ascending", "two-armed-1"))
     rows = TABLES["differences"](seen)
-    others = ["cma-es/bandit", "dual-process/EC1"]
+    others = ["cma-es/bandit", "learner"]
     assert rows.index.tolist() == [f"mine {name}" for name in others]
     differences = [1.5 / 292 - 13 / 292, 11 / 292 - 13 / 292]
     assert rows.difference.tolist() == pytest.approx(differences)
@@ -297,7 +297,7 @@ def test_settings_are_ranked_as_methods_are():
                                                                setting=at)]  # fmt: skip
     seen = with_settings("", "noise_sd=0.1", "noise_sd=0.2", more=[*between, *own])
     ranked = TABLES["ranking"](seen)
-    settings = [f"{EC1} noise_sd=0.2", "hill-climbing", f"{EC1} noise_sd=0.1", EC1]
+    settings = ["learner noise_sd=0.2", "hill-climbing", "learner noise_sd=0.1", "learner"]
     assert ranked.index.tolist() == [*settings, "mine", "mine width=0.2"]
     means = [493.4, 494, 497.4]
     assert ranked.gap.tolist()[:3] == pytest.approx([(mean - 292) / 292 for mean in means])
@@ -324,7 +324,7 @@ def test_learners_over_all_tasks_stand_for_their_conditions():
         for task, label in (("ascending", one), ("two-armed-1", two))
     }
     learned = study(rewards)
-    together = [BOTH, "dual-process (EC1-informed, EC4-informed)"]
+    together = [BOTH, "informed learner"]
     assert headline_methods(learned.methods.loc[learned.runs.ranked_as.unique()]) == together
     titles = ["learner (EC1, EC4)", "informed learner (EC1, EC4)"]
     assert learned.methods.title[together].tolist() == titles

@@ -18,6 +18,7 @@ from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
 from coartic import Task
+from coartic.analysis.contrasts import ALL, OPEN, OPPOSITE, SHOWN, UNITS_OF_QUANTITIES
 from coartic.analysis.control import contexts_of_control, shared_goal
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import FIGURES as FIGURES
@@ -45,8 +46,6 @@ from coartic.analysis.methods import (
 )
 from coartic.analysis.running_times import (
     TARGETS,
-    best_after,
-    improvements,
     interval_by_budget,
     runs_with_targets,
     runtimes,
@@ -56,7 +55,7 @@ from coartic.analysis.running_times import (
 from coartic.analysis.signatures import TwoContexts
 from coartic.analysis.standings import ranked_tasks, reference, runs_on, standings
 from coartic.analysis.statistics import other_tasks
-from coartic.analysis.study import Study, shared_cells, solved
+from coartic.analysis.study import Study, best_after, improvements, shared_cells, solved
 from coartic.analysis.tables import (
     gaps_by_family,
     gaps_of_settings,
@@ -72,6 +71,8 @@ from coartic.estimates import MIN_VALUES, Estimate
 from coartic.internal.text import pluralize
 from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot
 from coartic.robot import Array
+from coartic.runs.contrasts import bounds_of
+from coartic.runs.plan import world_title
 from coartic.tasks.task import shipped_tasks
 
 
@@ -973,3 +974,55 @@ def _draw_order(axes: Axes, goals: Array, apart: float) -> None:
     for goal, (x, y) in enumerate(places, 1):
         text: Any = {"ha": "center", "va": "center_baseline", "fontsize": 8, "zorder": 5}
         axes.text(x, y, str(goal), **text)
+
+
+_LOOKS = {SHOWN: (style.GREEN, "o"), OPPOSITE: (style.VERMILLION, "D"), OPEN: (style.GREY, "s")}
+"""Colour and marker of each verdict in the forest plot."""
+
+
+@figure(
+    "Estimates of the contrasts",
+    "Rows: families and worlds. Markers: median over tasks with its "
+    f"{style.COVERAGE} interval; of a task without a family, the mean with its interval over runs. "
+    "Green circles: shown; red diamonds: opposite shown; grey squares: neither. "
+    "Dashed lines: bounds of the expectations.",
+    of_folder=True,
+)
+def draw_contrasts(study: Study) -> Parts | None:
+    """Draw the estimate of each cell of each contrast, with a panel for each contrast.
+
+    The result is None if the folder has no contrasts with an estimate.
+    """
+    data = study.contrasts.drop(columns="run_ids")
+    data = data.assign(
+        value=data["median"].where(data["median"].notna(), data["mean"]).astype(float),
+        low=data.median_low.where(data["median"].notna(), data.mean_low).astype(float),
+        high=data.median_high.where(data["median"].notna(), data.mean_high).astype(float),
+    )
+    data = data[data.value.notna() & (data.family != ALL)]
+    if not len(data):
+        return None
+    groups = [rows for _, rows in data.groupby("contrast", sort=False)]
+    heights = [0.75 + 0.17 * len(rows) for rows in groups]
+    drawing = Figure(figsize=(style.TWO, sum(heights)), layout="constrained")
+    panels = drawing.subplots(len(groups), 1, height_ratios=heights, squeeze=False)[:, 0]
+    several = len({*data.world}) > 1
+    for axes, rows in zip(panels, groups, strict=True):
+        for place, row in enumerate(rows.to_dict("records")):
+            color, marker = _LOOKS.get(row["verdict"], _LOOKS[OPEN])
+            axes.plot([row["low"], row["high"]], [-place, -place], color=color, linewidth=1.2)
+            axes.plot(row["value"], -place, marker, color=color, markersize=4)
+        for bound in bounds_of(str(rows.expected.iloc[0])):
+            axes.axvline(bound, **style.INITIAL)
+        names = [
+            f"{family}".split("/")[0] + (f", {world_title(f'{world}')}" if several else "")
+            for family, world in zip(rows.family, rows.world, strict=True)
+        ]
+        style.name_rows(axes, names)
+        axes.set_title("\n".join(textwrap.wrap(str(rows.says.iloc[0]), 80)), loc="left")
+        axes.set_xlabel(UNITS_OF_QUANTITIES[str(rows.quantity.iloc[0])])
+    words = "; ".join(
+        f"{row['says']} {row['family']}: {number(row['value'])}, {row['verdict'] or 'described'}"
+        for row in data.to_dict("records")
+    )
+    return drawing, data, words, ""

@@ -102,7 +102,9 @@ FIGURES: dict[str, DrawsFigure] = {}
 :mod:`coartic.analysis.figures.drawings`."""
 
 
-def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:
+def figure(
+    title: str, caption: str, *, of_folder: bool = False
+) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:
     """Return a decorator that makes a figure of the report from a drawing function.
 
     The decorator adds the decorated function to :data:`FIGURES`, with the id of the figure as the
@@ -124,12 +126,15 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
         ``runs`` of the figure's numbers, such as ``20 to 50``, or for one number if they are equal.
         It is empty if there is no such column. ``{reference}`` stands for the name of the rewards
         from which gaps are measured (:func:`.reference`).
+    of_folder : bool
+        True for a figure about all worlds of a folder at once.
     """
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:
         @wraps(draw)
         def plot(study: Study, /, *, width: float | None = None, style: Any = ()) -> Plot | None:
-            check_study(study)
+            if not of_folder:
+                check_study(study)
             with styles.context(["default", RC, *([style] if style else [])]), drawn_at(width):
                 if (parts := draw(study)) is None:
                     return None
@@ -140,10 +145,12 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
             has_dagger = any("†" in text for text in texts)
             words = f"{caption}{more}{f' {RECONSTRUCTED}' if has_dagger else ''}"
             ends = (data.runs.min(), data.runs.max()) if "runs" in data else ()
-            to = reference(study, study.optima)
+            to = "" if of_folder else reference(study, study.optima)
             n = " to ".join(dict.fromkeys(map(number, ends)))
             name = id_of(draw) + ending_of(study)
-            heading = f"{title}, in {world_title(study.world)}" if study.world else title
+            heading = title
+            if not of_folder and study.world:
+                heading = f"{title}, in {world_title(study.world)}"
             words = words.replace("{n}", n).replace("{reference}", to)
             return Plot(name, heading, words, alt, drawing, data)
 

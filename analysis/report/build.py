@@ -19,7 +19,7 @@ from coartic.analysis.figures.plot import FIGURES, Plot, for_page, panels_for_pa
 from coartic.analysis.figures.style import ONE
 from coartic.analysis.report import sections
 from coartic.analysis.report.player import player
-from coartic.analysis.report.sections import IN_NOISE, SECTIONS, Section
+from coartic.analysis.report.sections import IN_NOISE, QUESTIONS, SECTIONS, Section
 from coartic.analysis.standings import neighbours, reference
 from coartic.analysis.study import Study, ending_of
 from coartic.analysis.tables import (
@@ -30,8 +30,10 @@ from coartic.analysis.tables import (
     html_of,
     is_setting,
     latex_of,
+    list_contrasts,
     list_not_ranked,
     list_ranking,
+    matrix_of,
 )
 from coartic.analysis.words import id_of, listed, marked, number
 from coartic.internal.files import check_inside, describe_os_errors, make_folder, publish
@@ -125,13 +127,24 @@ def write_report(
         shown, first = list[dict[str, Any]](), list[Plot]()
         frames = defaultdict[str, dict[str, pd.DataFrame]](dict)
         texts, files = defaultdict[str, list[str]](list), {"report.html": b""}
+        if len(study.contrasts):
+            shown += _sections_shown(study, [QUESTIONS], [], failures, watch)
+            frames[list_contrasts.id][""] = list_contrasts(study)
+            if for_paper:
+                title = QUESTIONS.title
+                tex = sections.attempt(failures, title, _latex_of, study, list_contrasts)
+                texts[list_contrasts.id].append(tex or "")
+                made = sections.attempt(failures, title, _files_of_figures, study, QUESTIONS, width)
+                files |= made or {}
         for world, of_world in study.worlds.items():  # all of a world, so that caches are small
             of_page = [sections.section_of_world(of_world)]
-            if is_first := not shown:
+            if is_first := not any(section["id"] != QUESTIONS.id for section in shown):
                 of_page = [*sections.visible_sections(of_world), *([own] if own else [])]
                 first = sections.attempt(failures, "Pictures", _first_figures, of_world) or []
             shown += _sections_shown(of_world, of_page, first * is_first, failures, watch)
             for name, table in tables.items():
+                if table.of_folder:
+                    continue
                 title = names.get(name, name)
                 frame = sections.attempt(failures, title, table, of_world)
                 if frame is not None and len(frame):
@@ -168,7 +181,7 @@ def _latex_of(study: Study, table: Table) -> str:
     """
     if not any(column.in_latex for column in table.columns):
         return ""
-    notes = sections.notes_of(study, table(study).columns)
+    notes = [] if table.of_folder else sections.notes_of(study, table(study).columns)
     return latex_of(table, study, _rows_shown(study, table), notes)
 
 
@@ -229,7 +242,9 @@ def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str
             words |= {"below": neighbours(study) if table is list_ranking else ""}
             tables.append({**words, "html": html_of(table, study, frame), "folded": folded})
     finding = sections.finding(study, section)
-    is_answer = list_ranking in section.tables and sections.varies_parameters(study)
+    is_answer = section is QUESTIONS or (
+        list_ranking in section.tables and sections.varies_parameters(study)
+    )
     return {
         "finding": finding,
         "first_lines": len(finding) if is_answer else 1,
@@ -297,7 +312,9 @@ def _sections_shown(
         parts = parts or {"finding": [], "first_lines": 1, "figures": [], "shown": []}
         failure = failures.get(section.title, "")
         if failure or parts["figures"] or parts["shown"]:
-            note = section.note.replace("{reference}", reference(study, study.optima))
+            note = section.note
+            if "{reference}" in note:
+                note = note.replace("{reference}", reference(study, study.optima))
             shown.append({**vars(section), **parts, "failure": failure, "note": note})
     return shown
 
@@ -352,6 +369,7 @@ def _page(
         player=sections.attempt(failures, "Film", player, main) or "",
         script=(HERE / "page.js").read_text("utf-8"),
         sections=shown,
+        matrix=matrix_of(study) if len(study.contrasts) else None,
         first=[(plot, for_page(plot)) for plot in first],
         stage=stage,
         suite=study.suite,

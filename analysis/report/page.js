@@ -14,7 +14,7 @@
     return a.localeCompare(b, "en", { numeric: true });
   };
 
-  document.querySelectorAll("table").forEach((table) => {
+  document.querySelectorAll("table:not(.matrix)").forEach((table) => {
     const body = table.tBodies[0];
     const rows = [...body.rows];
     [...table.tHead.rows[0].cells].forEach((head, column) => {

@@ -19,6 +19,7 @@ import pandas as pd
 from jinja2 import Environment, StrictUndefined, Template
 
 from coartic.analysis.figures.drawings import (
+    draw_contrasts,
     draw_gaps_by_family,
     draw_learning_curves,
     draw_postures,
@@ -36,7 +37,6 @@ from coartic.analysis.methods import (
     KNOWN_METHODS,
     RANDOM_SEARCH,
     SEARCHES,
-    joined_label,
     subject_of,
     title_of,
 )
@@ -51,8 +51,10 @@ from coartic.analysis.standings import (
 from coartic.analysis.study import Study, ending_of, shared_cells
 from coartic.analysis.tables import (
     Table,
+    answer_lines,
     is_setting,
     list_contexts,
+    list_contrasts,
     list_differences,
     list_failed,
     list_family_gaps,
@@ -80,6 +82,7 @@ from coartic.internal.text import error_line, one_line, pluralize
 from coartic.internal.user_files import is_users
 from coartic.method import TRIALS
 from coartic.runs.plan import world_title
+from coartic.runs.rows import LEARNER as ROW_OF_LEARNER
 
 Made = TypeVar("Made")
 RUNS = 20
@@ -302,6 +305,23 @@ ascending=[true, false]) %}
 )
 
 
+QUESTIONS = Section(
+    "questions",
+    "Questions",
+    (list_contrasts,),
+    (draw_contrasts,),
+    note="A cell is a sentence in one family and one world. A field has the number of tasks on the "
+    "expected side of the bound, and the number of tasks; a star refers to a note in the table. "
+    "The unit is the task, with the mean over "
+    "its runs. Shown and opposite shown: p < 0.05 in an exact two-sided sign test over tasks, "
+    "corrected by Holm over the cells of a sentence, and more than half of all tasks on this side. "
+    "Of m sentences without an effect, 1 − 0.95^m show something by chance. The folder notes when "
+    "a sentence was first asked: a reminder for honest people, no proof against others.",
+    single=False,
+)
+"""The first section of the page, about all worlds of a folder, if its suite asks questions."""
+
+
 def section_of_world(study: Study) -> Section:
     """Return the section of the page for a world that is not the first world of a folder.
 
@@ -371,6 +391,8 @@ def finding(study: Study, section: Section) -> list[str]:
     if its first table has no rows. If the first table is the ranking and has no rows, the only line
     says that no method is ranked.
     """
+    if section is QUESTIONS:
+        return [shown(line) for line in answer_lines(study.contrasts)]
     is_ranking = section.tables[0] is list_ranking
     if not section.sentence or not len(section.tables[0](study)):
         return ["No method is ranked."] if is_ranking else []
@@ -451,7 +473,7 @@ def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
     These are all rows of the methods in the first two rows, of the paper's learner (EC1, EC4, or
     both together), of random search, and of methods from files.
     """
-    always = [joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH]
+    always = [ROW_OF_LEARNER, EC1, EC4, RANDOM_SEARCH]
     is_shown = rows.method.isin([*rows.method[:2], *always]) | rows.own
     return rows[is_shown].to_dict("records")
 

@@ -23,6 +23,12 @@ from coartic.analysis.tables.language import (
     shown_columns,
     table,
 )
+from coartic.analysis.tables.questions import (
+    answer_lines,
+    list_contrasts,
+    matrix_of,
+    needs_executions,
+)
 from coartic.analysis.tables.ranking import (
     ValueOfParameter,
     gaps_of_settings,
@@ -53,6 +59,7 @@ __all__ = [
     "ShownColumn",
     "Table",
     "ValueOfParameter",
+    "answer_lines",
     "caption_of",
     "column_of",
     "csv_of",
@@ -64,6 +71,7 @@ __all__ = [
     "is_setting",
     "latex_of",
     "list_contexts",
+    "list_contrasts",
     "list_differences",
     "list_failed",
     "list_family_gaps",
@@ -76,6 +84,8 @@ __all__ = [
     "list_saved",
     "list_signatures",
     "list_tasks",
+    "matrix_of",
+    "needs_executions",
     "number_text",
     "shown_columns",
     "table",

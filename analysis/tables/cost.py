@@ -11,9 +11,7 @@ from coartic.analysis.methods import (
 )
 from coartic.analysis.running_times import (
     SPENDS,
-    best_after,
     budget_for,
-    improvements,
     runs_with_targets,
     share_reached,
     times_of,
@@ -22,7 +20,7 @@ from coartic.analysis.running_times import (
 from coartic.analysis.standings import (
     cells_of,
 )
-from coartic.analysis.study import Study, shared_cells, solved
+from coartic.analysis.study import Study, best_after, improvements, shared_cells, solved
 from coartic.analysis.tables.language import Row, Rows, named, run_ids, table
 from coartic.estimates import (
     Estimate,

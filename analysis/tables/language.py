@@ -119,6 +119,8 @@ class Table:
     with_settings: bool = False
     """True if page and LaTeX also show the settings and ablations of other methods in the table
     (:func:`is_setting`). The CSV file always has these rows."""
+    of_folder: bool = False
+    """True for a table about all worlds of a folder at once."""
 
     def __call__(self, study: Study) -> pd.DataFrame:
         """Return the table of a study as a frame, indexed by row names.
@@ -128,7 +130,8 @@ class Table:
         labels of methods. If the study has warnings about methods (:attr:`.Study.marks`), column
         ``note`` contains them. Raises CoarticError for a study of several worlds.
         """
-        check_study(study)
+        if not self.of_folder:
+            check_study(study)
         return _frame_of(self, study).copy()
 
 
@@ -137,7 +140,7 @@ TABLES: dict[str, Table] = {}
 
 
 def table(
-    caption: str, columns: str, *, with_settings: bool = False
+    caption: str, columns: str, *, with_settings: bool = False, of_folder: bool = False
 ) -> Callable[[Callable[[Study], Rows]], Table]:
     """Return a decorator that turns a function that yields rows into a :class:`Table`.
 
@@ -152,12 +155,15 @@ def table(
         A line for each column (:func:`column_of`).
     with_settings : bool
         True to show also settings and ablations (:attr:`Table.with_settings`).
+    of_folder : bool
+        True for a table about all worlds of a folder at once.
     """
     parts = [column_of(line) for line in columns.splitlines() if line.strip()]
 
     def as_table(rows: Callable[[Study], Rows]) -> Table:
         with_ids = *parts, Column("run_ids")
-        made = TABLES[id_of(rows)] = Table(id_of(rows), caption, with_ids, rows, with_settings)
+        name = id_of(rows)
+        made = TABLES[name] = Table(name, caption, with_ids, rows, with_settings, of_folder)
         return made
 
     return as_table
@@ -227,6 +233,8 @@ def caption_of(table: Table, study: Study) -> str:
 
     In another world than the paper's, the name of the world is added in parentheses.
     """
+    if table.of_folder:
+        return table.caption
     caption = table.caption.replace("{tasks}", pluralize(len(ranked_tasks(study)), "task"))
     caption = caption.replace("{reference}", reference(study, study.optima))
     return caption + (f" ({world_title(study.world)})" if study.world else "")
@@ -300,7 +308,8 @@ def shown_columns(
         **dict(study.elsewhere.get("title", {})),
         **_USES,
     }
-    to, shown = reference(study, study.optima), dict[str, ShownColumn]()
+    to = "" if table.of_folder else reference(study, study.optima)
+    shown = dict[str, ShownColumn]()
     for column in table.columns:
         if not column.heading or (in_latex and not column.in_latex):
             continue

@@ -19,10 +19,6 @@ from coartic.analysis.methods import (
     default_name,
 )
 from coartic.analysis.optima import relative_gap
-from coartic.analysis.running_times import (
-    best_after,
-    improvements,
-)
 from coartic.analysis.standings import (
     PLACES,
     compared_runs,
@@ -39,7 +35,7 @@ from coartic.analysis.statistics import (
     holm,
     stratified_test,
 )
-from coartic.analysis.study import Study, shared_cells, solved
+from coartic.analysis.study import Study, best_after, improvements, shared_cells, solved
 from coartic.analysis.tables.language import Row, Rows, run_ids, table
 from coartic.estimates import (
     FEWER_RESAMPLES,
@@ -281,7 +277,7 @@ def list_differences(study: Study) -> Rows:
             alike = methods.index != against
         for row in methods.index[alike & (methods.parent == "")].intersection(rows.index):
             runs = runs_on(study, row, tasks) if tasks else compared_runs(study)[:0]
-            names = runs.label.unique()
+            names = runs.ranked_as.unique()
             name = names[0] if len(names) == 1 else row
             budgets = {*runs.budget.dropna()}
             is_fair = budgets == asked or not (budgets and asked) or ranking_budget(study) is None
@@ -416,7 +412,7 @@ def gaps_of_settings(study: Study, labels: Sequence[str]) -> pd.Series:
     out if one of the settings has no such run.
     """
     runs = compared_runs(study)
-    runs = runs[runs.label.isin(labels)]
+    runs = runs[runs.ranked_as.isin(labels)]
     by_run = runs.groupby(["task", "run"], sort=False).gap.agg(["mean", "size"])
     return by_run["mean"][by_run["size"] == len(labels)]
 
@@ -474,7 +470,7 @@ def list_parameters(study: Study) -> Rows:
         rows = zip(values, estimates, differences, p, strict=True)
         for place, (value, estimate, difference, adjusted) in enumerate(rows):
             runs = compared_runs(study)
-            runs = runs[runs.label.isin(value.labels)]
+            runs = runs[runs.ranked_as.isin(value.labels)]
             difference = Estimate(math.nan) if place == best else difference
             entries: Row = {"parameter": parameter, "value": one_line(str(value.value))}
             entries |= {**estimate.columns("gap"), **difference.columns("difference")}
@@ -495,7 +491,7 @@ def _are_equal(study: Study, settings: Sequence[Sequence[str]]) -> bool:
     """
     by_run = compared_runs(study).set_index(["task", "run"])
     for labels in zip(*settings, strict=True):
-        first, *others = (by_run.value[by_run.label == label].sort_index() for label in labels)
+        first, *others = (by_run.value[by_run.ranked_as == label].sort_index() for label in labels)
         if not all(first.equals(other) for other in others):
             return False
     return True

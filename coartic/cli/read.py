@@ -7,6 +7,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -57,18 +58,22 @@ def report(
             "FILE", "Python file with your own tables and figures; may be repeated.", "--with"
         ),
     ] = None,
+    contrasts: Annotated[
+        Path | None,
+        given.option("FILE", "Questions about these results: a TOML file with [[contrasts]]."),
+    ] = None,
 ) -> None:
     """Write the report of a results folder."""
     if width is not None and not for_paper:
         raise CoarticError("--width has no effect without --for-paper")
-    from coartic.runs.shipped import SHIPPED
+    from coartic.runs.shipped import SHIPPED_SUITES
 
     if out is None:  # shipped results have no folder; Git ignores `results` in a checkout
-        out = Path("results" if str(folder) == SHIPPED else "") / folder / "report"
+        out = Path("results" if str(folder) in SHIPPED_SUITES else "") / folder / "report"
     from coartic.analysis import TABLES
     from coartic.analysis.report.build import write_report
     from coartic.analysis.report.own import own_section
-    from coartic.analysis.study import load
+    from coartic.analysis.study import load, with_contrasts
 
     section = own_section(own or [])
     started = time.monotonic()
@@ -78,6 +83,7 @@ def report(
     ):
         display.show(f"Reading {folder}")
         study = load(str(folder), against=against or "")
+        study = study if contrasts is None else with_contrasts(study, contrasts)
         differences = map(TABLES["differences"], study.worlds.values())
         if against and not any(map(len, differences)):
             raise CoarticError(
@@ -101,11 +107,13 @@ def report(
 
 
 def say_ranking(study: Study, folder: Path) -> None:
-    """Print the ranking of each world, and the command for a report.
+    """Print the ranking of each world, the answers to contrasts, and the command for a report.
 
     Each ranking has the name of its world as a heading, unless the folder contains only runs in the
-    paper's world. ``folder`` is the results folder of the study.
+    paper's world. Contrasts that need executions of solutions are left to the report. ``folder`` is
+    the results folder of the study.
     """
+    from coartic.analysis.tables import answer_lines, needs_executions
     from coartic.analysis.words import capital
     from coartic.runs.plan import world_title
 
@@ -114,6 +122,11 @@ def say_ranking(study: Study, folder: Path) -> None:
         say(*([f"{capital(world_title(world))}:"] if has_headings else []))
         _say_ranking_of_world(of_world)
         say(*([""] if has_headings else []))
+    quick = [record for record in study.asked if not needs_executions(record.contrast.quantity)]
+    lines = answer_lines(replace(study, asked=quick).contrasts) if quick else []
+    later = len(study.asked) - len(quick)
+    lines += [f"{pluralize(later, 'sentence')} more: see the report"] if later else []
+    say_pairs([("" if place else "Questions", line) for place, line in enumerate(lines)])
     page = folder / "report" / "report.html"
     say_pairs([("Report", f"`coartic report {quote(str(folder))}` writes {page}")])
 
@@ -323,7 +336,7 @@ def _describe_run(run: Row, code: str) -> None:
     """
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
-    from coartic.runs.plan import describe_parameters
+    from coartic.internal.text import describe_parameters
 
     cell, result = run.cell, f"{run['status']}: {run['reason']}"
     if run["reward"] is not None:
@@ -446,12 +459,12 @@ def draw(
     from coartic.benchmarks.suites import check_kind
     from coartic.internal.files import check_ending, check_output, publish, write_output
     from coartic.runs.plan import tasks_by_name
-    from coartic.runs.shipped import SHIPPED, open_results
+    from coartic.runs.shipped import SHIPPED_SUITES, open_results
     from coartic.tasks.families import named_by
     from coartic.tasks.task import task_text
 
     for name in tasks or ():
-        if name == SHIPPED or (name not in builtin_tasks() and Path(name).is_dir()):
+        if name in SHIPPED_SUITES or (name not in builtin_tasks() and Path(name).is_dir()):
             with open_results(given.results_folder(name)):  # explains what another folder lacks
                 raise CoarticError(
                     f"{name} is a results folder, not a task. `coartic draw {quote(name)} --run "

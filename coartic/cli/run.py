@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -289,8 +290,8 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     """Yield a description of a method, as pairs of a heading and a text (:func:`.say_pairs`)."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
+    from coartic.internal.text import describe_parameters
     from coartic.runs.method_info import WITHDRAWN
-    from coartic.runs.plan import describe_parameters
 
     applies = (
         task for task in builtin_tasks() if info.inapplicable_reason(load_task(task)) is None
@@ -376,18 +377,53 @@ def _show_results(name: str, results: Sequence[CheckResult]) -> int:
     return len(results) - passed
 
 
+def _new_study(name: str, out: Path | None, replace: bool) -> None:
+    """Write a suite with two contrasts into a file."""
+    import coartic
+    from coartic.benchmarks.suites import suites
+    from coartic.internal.files import check_ending, write_output
+    from coartic.tasks.task import NAME_PATTERN
+
+    path = Path(f"{name}.toml") if out is None else out
+    check_ending(path, [".toml"])
+    if name in suites() or not re.fullmatch(NAME_PATTERN, name):
+        raise CoarticError(
+            f"coartic new: a suite cannot have the name {name!r}: choose another one of letters, "
+            "digits, dots, hyphens and underscores"
+        )
+    template = Path(coartic.__file__).parent / "benchmarks" / "template_study.toml"
+    text = template.read_text(encoding="utf-8").replace("NAME", name)
+    write_output(path, text.encode(), replace=replace)
+    file = quote(str(path))
+    say_pairs(
+        [
+            ("Written", f"{path}: change it into your own question"),
+            ("Run", f"coartic run {file}"),
+            ("Report", f"coartic report results/{name}"),
+        ]
+    )
+
+
 def new(
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="Id of the method, such as my-search.")
+        str, typer.Argument(metavar="NAME", help="Id of the method or study, such as my-search.")
     ],
     planner: Annotated[
         bool,
         typer.Option("--planner", help="A planner, not an optimiser that learns from trials."),
     ] = False,
+    study: Annotated[
+        bool, typer.Option("--study", help="A suite that asks two questions, not a method.")
+    ] = False,
     out: given.Out = None,
     replace: given.Replace = False,
 ) -> None:
-    """Write a small working method into a file, to start your own."""
+    """Write a small working method or study, to start your own."""
+    if study:
+        if planner:
+            raise CoarticError("--planner has no effect with --study")
+        _new_study(name, out, replace)
+        return
     from coartic.benchmarks import template, template_planner
     from coartic.benchmarks.registry import check_id, registry
     from coartic.internal.files import check_ending, write_output

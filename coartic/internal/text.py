@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import difflib
 import unicodedata
-from collections.abc import Iterable
-from typing import Annotated
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
@@ -77,6 +77,11 @@ def escape(c: str) -> str:
 def pluralize(count: int, thing: str) -> str:
     """Return a count with its noun, such as ``1 run`` or ``2 runs``."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
+def describe_parameters(parameters: Mapping[str, Any]) -> str:
+    """Return parameters as a string, such as ``noise_sd=0.1, trials=100``; empty for none."""
+    return ", ".join(f"{name}={value}" for name, value in parameters.items())
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:

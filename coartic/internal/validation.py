@@ -112,7 +112,9 @@ def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool =
         case "missing" | "missing_argument" | "missing_keyword_only_argument":
             message = f"{key} is missing"
         case kind if kind in _UNKNOWN_KEY:
-            message = f"{key} is an unknown key{did_you_mean(str((root, *parts)[-1]), keys)}"
+            name = str((root, *parts)[-1])
+            known = "; it belongs in another table" if name in {*keys} else did_you_mean(name, keys)
+            message = f"{key} is an unknown key{known}"
         case kind if key and kind != "sentence":
             wanted = re.sub(r"^([A-Z][a-z]+ )?should ", "; it should ", message)
             found = f"{key} is {brief_value(problem['input'])}"

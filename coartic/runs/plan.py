@@ -15,7 +15,9 @@ from typing import Any
 import numpy as np
 
 from coartic.errors import CoarticError
+from coartic.internal.text import describe_parameters
 from coartic.model import PAPER, MotionModel, check_model, differences
+from coartic.runs.contrasts import Contrast
 from coartic.runs.method_info import MethodInfo, same_value
 from coartic.tasks.task import Task
 
@@ -126,9 +128,16 @@ class Job:
     """Number of trials of a run that the command sets or, by default, that the suite sets. It is at
     most the trial budget. If neither sets a number, it is the trial budget, or None without a
     budget."""
+    called: str = ""
+    """Name of the runs in rankings, figures and contrasts that the block of the suite gives (key
+    ``as``); empty for none."""
     question: tuple[str, str] | None = None
     """Title and description of the suite, if the suite is the user's own and the command adds no
     tasks to it; otherwise None."""
+    of_suite: bool = True
+    """False for a cell that the command, and not a block of the suite, asks for."""
+    contrasts: tuple[tuple[Contrast, int], ...] = ()
+    """Contrasts of the suite, each with its number of cells (:attr:`.Registered.cells`)."""
 
     def run_id(self, number: int) -> str:
         """Return the id of a run.
@@ -244,11 +253,6 @@ def hash_of(content: Any) -> str:
     """
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def describe_parameters(parameters: Mapping[str, Any]) -> str:
-    """Return parameters as a string, such as ``noise_sd=0.1, trials=100``; empty for none."""
-    return ", ".join(f"{name}={value}" for name, value in parameters.items())
 
 
 def world_title(world: str) -> str:

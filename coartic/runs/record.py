@@ -266,6 +266,7 @@ COLUMNS = (
     ("setting", "TEXT", "", "parameters that are not the defaults"),
     ("world", "TEXT", "",
      "constants of the [world](model.md#worlds) that are not the paper's; empty for the paper's"),
+    ("called", "TEXT", "", "name that the suite gives the runs (key `as`); empty for none"),
     ("run", "INTEGER NOT NULL", "number", "number of the run, from 0"),
     ("seed", "INTEGER NOT NULL", "seed", "the same for every method on a task and `run`"),
     ("status", "TEXT NOT NULL", "outcome.status",

@@ -20,7 +20,9 @@ from coartic.internal.files import folder_named
 from coartic.runs.store import RUNS_FILE, Store, open_content, open_store
 
 SHIPPED = "shipped"
-"""Name that stands for the shipped results in place of a folder."""
+"""Name that stands for the shipped results of suite ``comparison`` in place of a folder."""
+SHIPPED_SUITES = {SHIPPED: "comparison", f"{SHIPPED}-families": "families"}
+"""Maps each name that stands for shipped results to its suite."""
 SHIPPED_FOLDER = Path(coartic.__file__).parent / "benchmarks" / "shipped"
 HASHES = "SHA256SUMS"
 PACKED = ".sqlite.xz"
@@ -29,26 +31,27 @@ PACKED = ".sqlite.xz"
 def results_folder(name: str | Path) -> Path:
     """Return the results folder that a user names, in a command or in Python.
 
-    The string ``shipped`` stands for the shipped results, and the result is then the same word as a
-    path. A folder of this name can be named ``./shipped``, or by a :class:`pathlib.Path`; its path
-    is then absolute, so that it cannot be mistaken. The folder need not exist. Raises CoarticError
-    if the name is empty or blank.
+    The strings ``shipped`` and ``shipped-families`` stand for shipped results
+    (:data:`SHIPPED_SUITES`), and the result is then the same word as a path. A folder of this name
+    can be named ``./shipped``, or by a :class:`pathlib.Path`; its path is then absolute, so that it
+    cannot be mistaken. The folder need not exist. Raises CoarticError if the name is empty or
+    blank.
     """
     folder = folder_named(name)
-    return folder.absolute() if str(folder) == SHIPPED and name != SHIPPED else folder
+    return folder.absolute() if str(folder) in SHIPPED_SUITES and name != str(folder) else folder
 
 
 def own_folder(name: str | Path, what: str = "the name of a folder") -> Path:
     """Return the results folder that a user names for writing (:func:`results_folder`).
 
-    Raises CoarticError, whose message begins with ``what``, if the name is empty, or if it is the
-    string ``shipped``.
+    Raises CoarticError, whose message begins with ``what``, if the name is empty, or if it stands
+    for shipped results.
     """
     folder_named(name, what)
-    if name == SHIPPED:
+    if name in SHIPPED_SUITES:
         raise CoarticError(
-            f"{what} is {SHIPPED}, which stands for the results that come with coartic: choose "
-            f"another name, or write ./{SHIPPED}"
+            f"{what} is {name}, which stands for results that come with coartic: choose another "
+            f"name, or write ./{name}"
         )
     return results_folder(name)
 
@@ -83,10 +86,11 @@ def _decompressed(content: bytes) -> bytes:
 def open_results(folder: Path) -> AbstractContextManager[Store]:
     """Open a results folder (:func:`results_folder`) for reading in a ``with`` block.
 
-    The word ``shipped`` opens the shipped results of the suite ``comparison``. Raises the errors of
+    A word of :data:`SHIPPED_SUITES` opens shipped results. Raises the errors of
     :func:`.open_store` or :func:`open_shipped`.
     """
-    return open_shipped("comparison") if str(folder) == SHIPPED else open_store(folder)
+    suite = SHIPPED_SUITES.get(str(folder))
+    return open_shipped(suite) if suite else open_store(folder)
 
 
 @contextmanager
@@ -95,7 +99,7 @@ def unpacked(folder: Path) -> Iterator[Path]:
 
     It is the folder itself; for the shipped results it is a temporary folder.
     """
-    if str(folder) != SHIPPED:
+    if str(folder) not in SHIPPED_SUITES:
         yield folder
         return
     with tempfile.TemporaryDirectory() as place:

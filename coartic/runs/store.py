@@ -22,6 +22,7 @@ import zlib
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
+from dataclasses import replace
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -37,6 +38,7 @@ from coartic.internal.validation import explain
 from coartic.model import WORLD
 from coartic.motion.solution import Movement
 from coartic.robot import Array
+from coartic.runs.contrasts import Contrast, Registered
 from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
@@ -47,6 +49,7 @@ from coartic.runs.record import (
     movement_from,
     reward_bytes,
 )
+from coartic.runs.rows import places_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,18 +84,27 @@ _SOLUTIONS = """SELECT run_id, key AS "order", json_extract(value, '$[0]') AS go
 """Query of view ``solutions``. The code uses the query instead of the view, because some versions
 of SQLite do not call functions of JSON in a view of a file whose schema is not trusted."""
 _VIEWS = f"""CREATE VIEW asked AS SELECT position, results.*, suite.name AS suite, task, method,
-    setting, information, parameters, code, world, "commit", packages
+    setting, information, parameters, code, world, called, "commit", packages
     FROM suite JOIN cells ON runs IS NOT NULL
     JOIN results ON results.cell = cells.id AND suite_seed = suite.seed AND run < runs
     JOIN environments ON environments.id = results.environment;
 CREATE VIEW runs AS SELECT {_IN_VIEW} FROM asked ORDER BY position, run;
 CREATE VIEW solutions AS {_SOLUTIONS};"""
+_NEW_IN_CELLS = {
+    "world": "TEXT NOT NULL DEFAULT ''",
+    "called": "TEXT NOT NULL DEFAULT ''",
+    "of_suite": "BOOLEAN NOT NULL DEFAULT TRUE",
+}
+"""Dict that maps columns of table ``cells`` that older formats lack to their types."""
+_CONTRASTS = """CREATE TABLE IF NOT EXISTS contrasts (content TEXT PRIMARY KEY, says TEXT NOT NULL,
+    position INTEGER, cells INTEGER NOT NULL, date TEXT NOT NULL, runs INTEGER NOT NULL);"""
 _SCHEMA = f"""BEGIN;
 CREATE TABLE suite (name TEXT NOT NULL, seed INTEGER NOT NULL, content TEXT NOT NULL);
 CREATE TABLE cells (id TEXT PRIMARY KEY, position INTEGER, runs INTEGER, digest TEXT NOT NULL,
     code TEXT NOT NULL, task TEXT NOT NULL, method TEXT NOT NULL, setting TEXT NOT NULL,
     information TEXT NOT NULL, parameters TEXT NOT NULL, content TEXT NOT NULL,
-    world TEXT NOT NULL DEFAULT '');
+    {", ".join(f"{name} {kind}" for name, kind in _NEW_IN_CELLS.items())});
+{_CONTRASTS}
 CREATE TABLE environments (id TEXT PRIMARY KEY, content TEXT NOT NULL, "commit" TEXT,
     packages TEXT);
 CREATE TABLE results (cell TEXT NOT NULL REFERENCES cells, suite_seed INTEGER NOT NULL,
@@ -159,7 +171,43 @@ class Store:
             known = dict[str, Any]()
             for position, job in enumerate(plan):
                 place = {"position": position, "runs": job.numbers[-1] + 1}
-                self._insert("cells", **_checked_row(job.cell, known), **place)
+                names = {"called": job.called, "of_suite": job.of_suite}
+                self._insert("cells", **_checked_row(job.cell, known), **place, **names)
+            self._register(plan, str(made_with["date"]))
+
+    def _register(self, plan: Sequence[Job], date: str) -> None:
+        """Store the contrasts of a plan. Those that are stored already keep their date and runs."""
+        self._db.execute("UPDATE contrasts SET position = NULL")
+        if not plan[0].contrasts:
+            return
+        present = Counter(position for position, *_ in self.present())
+        places = places_of(plan)
+        for position, (contrast, cells) in enumerate(plan[0].contrasts):
+            runs = sum(present[k] for k, place in enumerate(places) if contrast.terms_at(place))
+            self._db.execute(
+                """INSERT INTO contrasts VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT (content)
+                DO UPDATE SET says = excluded.says, position = excluded.position,
+                    cells = excluded.cells""",
+                (contrast.content, contrast.says, position, cells, date, runs),
+            )
+
+    def contrasts(self) -> list[Registered]:
+        """Return the contrasts that the folder stores, those of the last command first."""
+        if not self._columns("contrasts"):  # a file of an older format
+            return []
+        query = """SELECT content, says, cells, position IS NOT NULL, date, runs FROM contrasts
+            ORDER BY position IS NULL, position, date"""
+        with explain_errors(self.folder):
+            return [
+                Registered(
+                    Contrast.model_validate({"says": says, **json.loads(content)}),
+                    cells,
+                    bool(is_asked),
+                    date,
+                    runs,
+                )
+                for content, says, cells, is_asked, date, runs in self._rows(query)
+            ]
 
     def _mend_worlds(self) -> None:
         """Write cells again whose world has an integer constant, as version 7.0.0 stored it.
@@ -190,15 +238,19 @@ class Store:
         """
         made_with = self.made_with()
         limits = made_with.get("time_limit_s"), made_with.get("trials")
-        query = """SELECT cells.id, cells.content, task, method, seed, runs, name FROM suite
-            JOIN cells ON runs IS NOT NULL ORDER BY position"""
+        here = {*self._columns("cells")}
+        new = ", ".join(f"{name}" if name in here else "NULL" for name in ("called", "of_suite"))
+        query = f"""SELECT cells.id, cells.content, task, method, seed, runs, name, {new}
+            FROM suite JOIN cells ON runs IS NOT NULL ORDER BY position"""
         plan, known = list[Job](), dict[str, Any]()
         with explain_errors(self.folder):
-            for cell_id, content, task, method, seed, runs, suite in self._rows(query):
+            for cell_id, content, task, method, seed, runs, suite, *of_block in self._rows(query):
                 cell = _cell_from(cell_id, content, known)
                 if (task, method) != (cell.task.name, cell.method.name):
                     raise ValueError(f"{method} on {task} has another name in its cell")
-                plan.append(Job(cell, seed, range(runs), limits[0], suite, limits[1]))
+                called, of_suite = of_block[0] or "", of_block[1] != 0
+                job = Job(cell, seed, range(runs), limits[0], suite, limits[1], called)
+                plan.append(replace(job, of_suite=of_suite))
         if not plan:
             raise CoarticError(f"the plan of {self.folder} is empty: {_RESUME}")
         return plan
@@ -428,6 +480,13 @@ class Store:
                         f"""INSERT OR IGNORE INTO main.{table} ({names})
                         SELECT {names} FROM other.{table} WHERE {condition}"""
                     )
+                if self._columns("contrasts", "other"):  # the older record of a contrast counts
+                    self._db.execute(
+                        """INSERT INTO main.contrasts
+                        SELECT content, says, NULL, cells, date, runs FROM other.contrasts
+                        WHERE TRUE ON CONFLICT (content) DO UPDATE
+                        SET date = excluded.date, runs = excluded.runs WHERE excluded.date < date"""
+                    )
         finally:
             self._db.execute("DETACH DATABASE other")
 
@@ -480,7 +539,7 @@ class Store:
             of :data:`.COLUMNS`, with nullable types.
         """
         there = {*self._columns("asked")}
-        missing = {"world": "'' AS world"}
+        missing = {"world": "'' AS world", "called": "'' AS called"}
         columns = [
             _NOISY.get(name, f'"{name}"')
             if name in there
@@ -855,8 +914,13 @@ def _add_columns(connection: sqlite3.Connection) -> None:
         for name, kind, source, _ in COLUMNS
         if source and name not in stored
     ]
-    if "world" not in {row[1] for row in connection.execute("PRAGMA table_info(cells)")}:
-        added.append("ALTER TABLE cells ADD COLUMN world TEXT NOT NULL DEFAULT '';")
+    in_cells = {row[1] for row in connection.execute("PRAGMA table_info(cells)")}
+    added += [
+        f"ALTER TABLE cells ADD COLUMN {name} {kind};"
+        for name, kind in _NEW_IN_CELLS.items()
+        if name not in in_cells
+    ]
+    added.append(_CONTRASTS)
     connection.executescript(
         f"""BEGIN; {" ".join(added)}
         DROP VIEW runs; DROP VIEW solutions; DROP VIEW asked; {_VIEWS}

@@ -20,9 +20,10 @@ import shipped
 
 from coartic import PAPER
 from coartic.analysis.optima import CANDIDATES, FRESH_EXECUTIONS
+from coartic.internal.text import describe_parameters
 from coartic.model import differences
 from coartic.motion.execution import execute_noisy
-from coartic.runs.plan import describe_parameters, reference_seed
+from coartic.runs.plan import reference_seed
 from coartic.runs.shipped import open_results
 from coartic.tasks.optima import best_shipped, task_hash
 
