@@ -11,6 +11,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from itertools import chain
 
 import numpy as np
 import pandas as pd
@@ -27,6 +28,7 @@ from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import listed, number
 from coartic.estimates import MIN_TASKS, MIN_VALUES
 from coartic.internal.text import pluralize
+from coartic.method.as_method import methods_named_in
 from coartic.robot import Array
 
 
@@ -163,6 +165,8 @@ def standings(study: Study) -> pd.DataFrame:
         why a method is not ranked; it is empty for a ranked method. Column ``note`` says, if it
         applies,
 
+        - from which other method's runs the method takes its hands, or the ticks at which it stops,
+          and how many runs never took so few (:mod:`coartic.method.as_method`);
         - how many trials the solved runs of a method from a file made, if the method uses the
           reward of each trial, and this number differs from the number that was asked for;
         - how many executions failed in a world with noise.
@@ -198,7 +202,9 @@ def standings(study: Study) -> pd.DataFrame:
         return elsewhere.reindex(columns=columns)
     by_method = runs_by_method(study)
     rows = ranking(runs.drop(columns="budget")).loc[[*by_method]].join(study.methods)
-    reasons, notes = [], []
+    reasons, notes, named = [], [], defaultdict[str, set[tuple[str, str]]](set)
+    for cell in (job.cell for job in study.plan if job.cell.named):
+        named[cell.label] |= {*methods_named_in(cell.parameters).items()}
     for (_, row), of_method in zip(rows.iterrows(), by_method.values(), strict=True):
         asked = sorted(map(int, of_method.budget.dropna().unique()))
         is_other = bool(budget) and bool({*asked} - {budget})
@@ -211,7 +217,14 @@ def standings(study: Study) -> pd.DataFrame:
         is_told = not row.built_in and row.information == BY_TRIAL and due and (made != due).any()
         ends = dict.fromkeys([made.min(), made.max()])
         failed = int(of_method.failed_executions.sum())
+        never = int((of_method.reached == False).sum())  # noqa: E712  # missing without `until`
         note = [
+            *(
+                f"takes its {'ticks' if name == 'until' else 'hands'} from runs of {other}, whose "
+                "trials are not counted"
+                for name, other in sorted({*chain(*(named[label] for label in {*of_method.label}))})
+            ),
+            (f"{pluralize(never, 'run')} never took so few ticks" if never else ""),
             (f"made {' to '.join(map(number, ends))} of {number(due)} trials" if is_told else ""),
             (f"{pluralize(failed, 'execution')} failed" if failed else ""),
         ]

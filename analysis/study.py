@@ -901,6 +901,8 @@ class Study:
         amounts = study.amounts(asked.quantity, *key, after=asked.after)
         if asked.quantity in (*SIGNATURES, *EXACT):
             amounts = amounts.iloc[:MAX_EXECUTED]
+        if place.stops:  # a run that never took so few ticks is no answer at equal saving
+            amounts = amounts.where(runs.reached[: len(amounts)].fillna(True).to_numpy(bool))
         return Values(amounts.to_numpy(np.float64), failed, runs.run_id.tolist())
 
     @_Copied

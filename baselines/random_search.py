@@ -33,6 +33,7 @@ from coartic.internal.validation import described_error
 from coartic.learner.conditions import MAX_NOISE
 from coartic.learner.learning import runs_at_once
 from coartic.method import TRIALS, Facts, Method, MethodError, Parameters, Result, Session
+from coartic.method.as_method import HandsOrMethod
 from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import HANDS
 from coartic.tasks.task import hands_of
@@ -75,8 +76,9 @@ class RandomSearchHandsParameters(Parameters):
 class RandomSearchParameters(RandomSearchHandsParameters):
     """Parameters of random search."""
 
-    hands: str | None = None
-    """Hand sequence, such as ``"RRLR"``. By default the method first makes one trial with each
+    hands: HandsOrMethod | None = None
+    """Hand sequence, such as ``"RRLR"``, or ``"as METHOD"`` for the hands of the answer of another
+    method, such as ``"as dual-process/EC4"``. By default the method first makes one trial with each
     sequence (while trials are left), in which only the corrective process acts. Then it uses the
     sequence with the highest reward. If there are more than 4096 sequences, it uses the task's
     initial sequence."""

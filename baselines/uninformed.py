@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic.method import TRIALS, MethodError, Parameters, Result, Session
+from coartic.method.as_method import HandsOrMethod
 from coartic.method.optimisers import explored_joints
 from coartic.motion.solution import Movement, movements_of
 from coartic.motion.trials import Trials
@@ -40,9 +41,10 @@ class UninformedParameters(Parameters):
 class SequenceParameters(UninformedParameters):
     """Parameters of methods to which the user can give the hand sequence."""
 
-    sequence: str | None = None
-    """Hand sequence of all trials, such as ``"RRLR"``, or ``"given"`` for the task's initial hands
-    (:meth:`.Session.find_initial_hands`). By default the method explores hand sequences."""
+    sequence: HandsOrMethod | None = None
+    """Hand sequence of all trials, such as ``"RRLR"``; ``"given"`` for the task's initial hands
+    (:meth:`.Session.find_initial_hands`); or ``"as METHOD"`` for the hands of the answer of another
+    method, such as ``"as dual-process/EC4"``. By default the method explores hand sequences."""
 
     def told_hands(self, session: Session) -> str | None:
         """Return the hand sequence that parameter ``sequence`` stands for, or None.

@@ -37,6 +37,8 @@ from coartic.internal.limits import (
 )
 from coartic.internal.text import describe_parameters, pluralize, unknown
 from coartic.internal.validation import FileData, described_error, explain
+from coartic.method import outline_of
+from coartic.method.as_method import reason_against_named
 from coartic.model import PAPER, MotionModel, differences
 from coartic.runs.contrasts import Contrast
 from coartic.runs.method_info import MethodInfo
@@ -490,6 +492,8 @@ def _suite_jobs(
                     parameters = block.parameters | dict(zip(block.grid, values, strict=True))
                     chosen = world or _world_of(request)
                     reason = method.refuses(chosen) or method.inapplicable_reason(task, parameters)
+                    if reason is None and method.is_ours:
+                        reason = reason_against_named(parameters, outline_of(task), chosen)
                     if reason is None:
                         yield job(task, method, parameters, block.runs, chosen, block.called)
                     elif not is_open and method.name not in left_out:

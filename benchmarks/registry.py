@@ -16,8 +16,7 @@ from coartic.errors import CoarticError
 from coartic.internal.text import unknown
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.method import built_in_methods
-from coartic.model import MODEL_VERSION
-from coartic.runs.method_info import BUILT_IN, MethodInfo, method_info
+from coartic.runs.method_info import BUILT_IN, MethodInfo, code_of, method_info
 
 _RESERVED = (METHOD_PREFIX, "optimum/")
 """Prefixes that only ids of built-in methods may have, because tables interpret these prefixes."""
@@ -70,7 +69,7 @@ def built_in() -> Mapping[str, MethodInfo]:
     Each call returns the same dict: do not change it.
     """
     return {
-        name: method_info(method, BUILT_IN, method.__module__, f"{MODEL_VERSION}.{method.version}")
+        name: method_info(method, BUILT_IN, method.__module__, code_of(method))
         for name, method in built_in_methods().items()
     }
 

@@ -207,10 +207,10 @@ def _can_run(cell: Cell, registered: Registry) -> bool:
     if method is None or method.code != cell.method.code:
         return False
     try:
-        method.complete(cell.parameters)
+        complete = method.complete(cell.parameters)
     except CoarticError:
         return False
-    return True
+    return method.codes_named_in(complete) == cell.named
 
 
 def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int, list[str]]:

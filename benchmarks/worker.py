@@ -30,6 +30,7 @@ from coartic.method import (
     outline_of,
     reason_against,
 )
+from coartic.method.as_method import reason_against_named, solve_in
 from coartic.motion.trials import trials_outside
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job
@@ -159,13 +160,16 @@ def perform_job(job: Job) -> list[Outcome]:
     try:
         method = cell.method.configure(cell.parameters)
         results: Sequence[Any]
-        reason_not = method.refuses(cell.model) or reason_against(method, outline_of(cell.task))
+        outline = outline_of(cell.task)
+        reason_not = method.refuses(cell.model) or reason_against(method, outline)
+        if cell.method.is_ours:
+            reason_not = reason_not or reason_against_named(cell.parameters, outline, cell.model)
         if reason_not is not None:
             raise MethodError("infeasible", str(reason_not))
-        if len(sessions) == 1:
-            results = [method.solve(sessions[0])]
+        if cell.method.is_ours:
+            results = solve_in(method, sessions)
         else:
-            results = method.solve_together(sessions)
+            results = [method.solve(session) for session in sessions]
         outside_trials = trials_outside() - outside_trials
         if outside_trials and not cell.method.is_ours:
             raise UndeclaredError(

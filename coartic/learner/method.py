@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, Self, get_type_hints
 
+import numpy as np
 from pydantic import Field, create_model, model_validator
 
 from coartic.learner.conditions import (
@@ -33,7 +35,9 @@ from coartic.method import (
     Result,
     Session,
 )
+from coartic.method.as_method import REACHED, HandsOrMethod, TicksOrMethod
 from coartic.model import WORLD
+from coartic.motion.solution import Movement, corrective_movements
 
 _FIELDS: dict[str, Any] = get_type_hints(ExplorationCondition, include_extras=True)
 del _FIELDS["id"], _FIELDS["hands"]  # parameters cannot change these
@@ -44,6 +48,14 @@ class DualProcessParameters(Parameters):
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Number of trials of a run; fewer if the budget has fewer left."""
+    sequence: HandsOrMethod | None = None
+    """Hand sequence of all trials, such as ``"RRLR"``, or ``"as METHOD"`` for the hands of the
+    answer of another method, such as ``"as cma-es/bandit"``. The learner then explores no hands. By
+    default it begins with the task's initial hands."""
+    until: TicksOrMethod | None = None
+    """The run ends with its first trial that takes at most so many ticks, or, with ``"as METHOD"``,
+    as many as the answer of another method. If no trial does, all trials are made. By default they
+    always are."""
 
 
 class CustomParameters(DualProcessParameters):
@@ -67,7 +79,14 @@ def _condition_of(base: ExplorationCondition, parameters: Parameters) -> Explora
 
     Raises ValueError if the values contradict each other.
     """
-    return replace(base, **parameters.model_dump(include={*_FIELDS}, exclude_none=True))
+    values = parameters.model_dump(include={*_FIELDS}, exclude_none=True)
+    given = parameters.model_dump(include={"sequence", "until"}, exclude_none=True)
+    if "sequence" in given:
+        values["hand_exploration"] = "none"
+    condition = replace(base, **values)
+    if "until" in given and condition.learned != "best":
+        raise ValueError("until needs a learner whose solution is its best trial")
+    return condition
 
 
 class DualProcess(Method):
@@ -131,29 +150,34 @@ class DualProcess(Method):
         parameters, condition = self.parameters, self.rules()
         tasks = [session.reveal(*self.information) for session in sessions]
         task, model = tasks[0], sessions[0].model
-        for session in sessions:
-            session.find_initial_hands(condition.hands)  # so that its trials are counted
+        start: Sequence[Movement] = ()
+        if parameters.sequence is None:
+            for session in sessions:
+                session.find_initial_hands(condition.hands)  # so that its trials are counted
+        else:
+            sessions[0].hand_codes(parameters.sequence, 1)  # which checks them
+            start = corrective_movements(parameters.sequence)
         left = sessions[0].trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
         if trials < 1:
             reason = "the trial budget leaves no trial to make"
             return [MethodError("infeasible", reason) for _ in sessions]
-        runs = learn_many(
-            task,
-            condition,
-            seeds=[session.seed for session in sessions],
-            trials=trials,
-            model=model,
-            jobs=1,
-        )
+        learn_some = partial(learn_many, task, condition, model=model, jobs=1, start=start)
+        runs = learn_some(seeds=[session.seed for session in sessions], trials=trials)
         results: list[Result | MethodError] = []
         for session, run in zip(sessions, runs, strict=True):
+            told = dict[str, Any]()
+            if parameters.until is not None:
+                good = np.ma.filled(run.rewards >= -parameters.until, fill_value=False)
+                told = {REACHED: bool(good.any())}
+                if good.any():  # a run of fewer trials has the same first trials
+                    (run,) = learn_some(seeds=[run.seed], trials=int(good.argmax()) + 1)
             session.spend(**{name: getattr(run.counters, name) for name in Meter.COUNTS})
             session.record(run.rewards.tolist(), run.wall_s)  # None where a trial failed
             if not run.learned:
                 results.append(MethodError("infeasible", run.reason))
                 continue
-            details = {CORRECTIONS_BY_TENTH: run.corrections.tolist()}
+            details = {CORRECTIONS_BY_TENTH: run.corrections.tolist(), **told}
             results.append(Result(run.learned, details, initial=run.initial, replay=run.replay))
         return results
 

@@ -370,6 +370,16 @@ def run_method(
     is_ours = any(type(method) in methods for methods in built_in)
     check_limits("seed", seed, 0, MAX_RUN_SEED)
     session = Session(chosen, int(seed), method.information, model=model, trusted=is_ours)
-    result = method.solve(session)
+    if is_ours:
+        from coartic.method.as_method import reason_against_named, solve_in
+
+        reason = reason_against_named(vars(method.parameters), outline_of(chosen), model)
+        if reason is not None:
+            raise NotApplicableError(reason)
+        (result,) = solve_in(method, [session])
+        if isinstance(result, MethodError):
+            raise result
+    else:
+        result = method.solve(session)
     session.check_solution(result.solution)
     return answer_of(result, model), session

@@ -794,6 +794,23 @@ class Session:
         self._use(*information)
         return self._task
 
+    def beside(self, information: Iterable[Information]) -> Session:
+        """Return a new session of the same run for another method of this project.
+
+        Task, seed, model and budget are those of this session; trials are counted anew. Raises
+        UndeclaredError if the method does not belong to this project.
+        """
+        self._needs_trust("beside")
+        return Session(
+            self._task,
+            self.seed,
+            information,
+            model=self.model,
+            trial_budget=self._trial_budget,
+            trusted=True,
+            of_run=self._of_run,
+        )
+
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
         """Record trials that a compiled method of this project made outside the session's calls.
 

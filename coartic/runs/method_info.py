@@ -24,8 +24,16 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import error_line, plain
 from coartic.internal.user_files import import_from
 from coartic.internal.validation import explain
-from coartic.method import Facts, Method, Outline, outline_of, reason_against
-from coartic.model import MotionModel, differences
+from coartic.method import (
+    Facts,
+    Method,
+    Outline,
+    built_in_methods,
+    outline_of,
+    reason_against,
+)
+from coartic.method.as_method import methods_named_in
+from coartic.model import MODEL_VERSION, MotionModel, differences
 from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
@@ -145,6 +153,14 @@ class MethodInfo:
             or name in ALWAYS_IN_IDS
             or not same_value(value, self.defaults[name])
         }
+
+    def codes_named_in(self, parameters: Mapping[str, Any]) -> dict[str, str]:
+        """Return a dict that maps the ids of built-in methods that parameters name to their codes.
+
+        The parameters of a method from a file name no methods.
+        """
+        named = methods_named_in(parameters) if self.is_ours else {}
+        return {name: code_of(built_in_methods()[name]) for name in named.values()}
 
     def inapplicable_reason(
         self, task: Task, parameters: Mapping[str, Any] | None = None
@@ -318,6 +334,11 @@ def _without_withdrawn(method: type[Method], parameters: Mapping[str, Any]) -> d
                 "parameter was withdrawn after version 7.0.0 (commit a0cf376b)"
             )
     return {name: parameters[name] for name in parameters if name not in withdrawn}
+
+
+def code_of(method: type[Method]) -> str:
+    """Return the code of a built-in method: the versions of model and method."""
+    return f"{MODEL_VERSION}.{method.version}"
 
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -35,6 +35,9 @@ class Cell:
     are not counted."""
     model: MotionModel = PAPER
     """Motion model of the trials and of the scoring, with the tolerances for the task."""
+    named: dict[str, str] = field(default_factory=dict)
+    """Dict that maps the ids of methods whose runs the method makes first to their codes
+    (:mod:`coartic.method.as_method`)."""
 
     def __post_init__(self) -> None:
         model = check_model(self.model).for_radius(self.task.radius)
@@ -88,7 +91,8 @@ class Cell:
     def digest(self) -> str:
         """Hash of task, id of the method, parameters, model and trial budget: 64 hex digits.
 
-        The code of the method and the time limit are not hashed.
+        The codes of methods that the parameters name are hashed as well. The code of the method
+        itself and the time limit are not.
         """
         return hash_of(self.content | {"method": self.method.name})
 
@@ -101,6 +105,7 @@ class Cell:
             "parameters": self.parameters,
             "model": self.model.stored(self.task.radius),
             "trial_budget": self.trial_budget,
+            **({"named": self.named} if self.named else {}),
         }
 
 
@@ -196,7 +201,8 @@ def cell_of(
     if trials is not None and "trials" in method.defaults:
         method = replace(method, defaults=method.defaults | {"trials": trials})
         parameters = {"trials": trials, **parameters}
-    return Cell(task, method, method.complete(parameters), trial_budget, model)
+    complete = method.complete(parameters)
+    return Cell(task, method, complete, trial_budget, model, method.codes_named_in(complete))
 
 
 def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:

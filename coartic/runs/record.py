@@ -18,6 +18,7 @@ from pydantic import Field, InstanceOf
 from coartic.errors import SolutionError
 from coartic.internal.limits import real_array
 from coartic.method import CORRECTIONS_BY_TENTH, MAX_COUNT, Meter
+from coartic.method.as_method import REACHED
 from coartic.model import PAPER, MotionModel
 from coartic.motion.doors import segment_lengths
 from coartic.motion.execution import Execution, execute_many, execute_noisy, other_arm_travel
@@ -212,6 +213,7 @@ def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date
         best_trial=None if reward is None or reward not in rewards else rewards.index(reward),
         early_corrections=tenths and tenths[1],
         late_corrections=tenths and tenths[-1],
+        reached=outcome.details.get(REACHED) if job.cell.method.is_ours else None,
         practice=_practice_of(rewards) if is_noisy and rewards else None,
         result=_result_of(outcome.status, movements, rewards),
         later=None,
@@ -302,6 +304,8 @@ COLUMNS = (
      "evaluations of the forward kinematics"),
     ("corrections", "INTEGER", "counts.corrections",
      "corrective movements of all these trials"),
+    ("reached", "BOOLEAN", "reached",
+     "of a run with parameter `until`: whether a trial took no more ticks than that"),
     ("failed_trials", "INTEGER", "counts.failed_trials", "trials that missed a goal"),
     ("gradients", "INTEGER", "counts.gradients", "evaluations of a solver's gradient"),
     ("solver_iterations", "INTEGER", "counts.solver_iterations", "iterations of a solver"),
