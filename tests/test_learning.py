@@ -421,7 +421,8 @@ def test_any_condition_is_a_setting_of_a_method(tmp_path):
     method = 'tasks = ["two-armed-1"]\nmethods = ["dual-process/custom"]'
     (cell,) = suite_of(tmp_path, f"{method}\nparameters = {{ {fields} }}")
     (method,) = (each for each in METHODS if each.name == "dual-process/custom")
-    asked = {name: cell.parameters[name] for name in method.Parameters.model_fields}
+    fields = method.Parameters.model_fields
+    asked = {name: value for name, value in cell.parameters.items() if name in fields}
     _, execution, _ = solve(method, "two-armed-1", seed=3, **asked)
     rules = replace(CONDITIONS["EC3"], modify_other=True, epsilon=0.4, drift=0.3)
     assert execution.reward == learn("two-armed-1", rules, seed=3, trials=30).reward

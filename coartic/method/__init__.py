@@ -21,8 +21,8 @@ from coartic.method.base import (
     built_in_methods,
     outline_of,
     reason_against,
-    run_method,
 )
+from coartic.method.run import run_method
 from coartic.method.session import (
     MAX_COUNT,
     METERED,

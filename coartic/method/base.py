@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,15 +12,13 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.dataclasses import dataclass as checked_dataclass
 
-from coartic.errors import NotApplicableError
-from coartic.internal.limits import MAX_RUN_SEED, brief_value, check_limits
+from coartic.internal.limits import brief_value
 from coartic.internal.validation import describe_validation_errors
 from coartic.method.session import Information, MethodError, Session
-from coartic.model import PAPER, WORLD, MotionModel, check_model, differences
+from coartic.model import PAPER, WORLD, MotionModel, differences
 from coartic.motion.initial_hands import too_many_sequences
 from coartic.motion.solution import Movement, next_action
 from coartic.robot import Hand
-from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import INITIAL_POLICIES, Task
 
 TRIALS = 10_000
@@ -317,69 +314,3 @@ def built_in_methods() -> Mapping[str, type[Method]]:
     the same dict: do not change it.
     """
     return {method.name: method for name in MODULES for method in import_module(name).METHODS}
-
-
-def run_method(
-    method: Method, task: TaskLike, seed: int = 0, *, model: MotionModel = PAPER
-) -> tuple[Result, Session]:
-    """Let a method solve a task in this process.
-
-    The session has no trial budget, and the solution is not executed. Methods of this project may
-    see the task itself, and may add to all counters. Any other method must work only through its
-    session. The session raises UndeclaredError if it detects the use of undeclared information
-    (:data:`METERED`).
-
-    Parameters
-    ----------
-    method : Method
-    task : Task, str or pathlib.Path
-    seed : int
-        Seed of the method's random numbers.
-    model : MotionModel
-
-    Returns
-    -------
-    result : Result
-        The solution with its details, as the method returns it (with motor noise:
-        :func:`answer_of`).
-    session : Session
-        The session in which the method found the solution, with its counts and rewards.
-
-    Raises
-    ------
-    MethodError
-        The method finds no solution.
-    UndeclaredError
-        The method uses information that it does not declare.
-    NotApplicableError
-        The method does not apply to the task or to the model, or finds no initial hands.
-    SolutionError
-        The solution is not a sequence.
-    TaskError, TypeError
-        The task cannot be used, or ``task`` or ``model`` has a wrong type.
-    ValueError
-        The seed is not an integer from 0 to 2^128 - 1, or a constant of the model is out of bounds
-        or does not fit the radius of the goals.
-    """
-    chosen = as_task(task)
-    model = check_model(model, radius=chosen.radius)
-    reason = method.refuses(model) or reason_against(method, outline_of(chosen))
-    if reason is not None:
-        raise NotApplicableError(reason)
-    built_in = (getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES)
-    is_ours = any(type(method) in methods for methods in built_in)
-    check_limits("seed", seed, 0, MAX_RUN_SEED)
-    session = Session(chosen, int(seed), method.information, model=model, trusted=is_ours)
-    if is_ours:
-        from coartic.method.as_method import reason_against_named, solve_in
-
-        reason = reason_against_named(vars(method.parameters), outline_of(chosen), model)
-        if reason is not None:
-            raise NotApplicableError(reason)
-        (result,) = solve_in(method, [session])
-        if isinstance(result, MethodError):
-            raise result
-    else:
-        result = method.solve(session)
-    session.check_solution(result.solution)
-    return answer_of(result, model), session

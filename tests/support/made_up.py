@@ -68,7 +68,7 @@ def row(method, reward, *, task="two-armed-1", run=0, setting="", **more):
         "noise_rule": NOISE_RULE,
         "world": "", "mean_ticks": None, "failed_executions": None, "practice": None,
         "information": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
-        "movement_ticks": 5000, "forward_kinematics": 1_234_567,
+        "reached": None, "movement_ticks": 5000, "forward_kinematics": 1_234_567,
         "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0, "cpu_s": 0.5,
         "warm": run > 0, "together": 1,
         "date": "2026-01-01 00:00:00", "called": "",
