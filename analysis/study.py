@@ -21,7 +21,15 @@ import pandas as pd
 from pydantic import Field, ValidationError
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences, initial_hands
-from coartic.analysis.contrasts import EXACT, QUANTITIES, Values, check_contrasts, rows_of
+from coartic.analysis.contrasts import (
+    EXACT,
+    OF_CURVE,
+    QUANTITIES,
+    Values,
+    check_contrasts,
+    planned_cells,
+    rows_of,
+)
 from coartic.analysis.frames import shares
 from coartic.analysis.methods import methods_of, parameters_varied, ranked_as
 from coartic.analysis.optima import (
@@ -33,8 +41,9 @@ from coartic.analysis.optima import (
     run_values,
 )
 from coartic.analysis.signatures import SIGNATURES, Solutions
-from coartic.analysis.words import listed, slugs, titled_apart
+from coartic.analysis.words import listed, number, slugs, titled_apart
 from coartic.errors import CoarticError
+from coartic.internal.limits import brief_value
 from coartic.internal.text import plain, pluralize, unknown
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, explain
@@ -77,6 +86,44 @@ def _labelled(stored: pd.DataFrame) -> pd.DataFrame:
     """Return stored runs with the columns ``label`` and ``ranked_as`` of :attr:`Study.runs`."""
     runs = stored.assign(label=[*map(label_of, stored.method.tolist(), stored.setting.tolist())])
     return runs.assign(ranked_as=ranked_as(runs))
+
+
+_AT_THE_END = (
+    *("hands", "replay_reward", "replay_hands", "movement_ticks", "forward_kinematics"),
+    *("corrections", "failed_trials", "gradients", "solver_iterations", "solution_corrections"),
+    *("early_corrections", "late_corrections", "other_arm_travel", "build_s", "solve_s"),
+    *("wall_s", "cpu_s", "process_peak_mb"),
+)
+"""Columns of runs that are known only of a whole run."""
+
+
+def _cut(
+    runs: pd.DataFrame, curves: Mapping[str, tuple[Array, Array]], trials: int
+) -> pd.DataFrame:
+    """Return runs with what is known of them after some trials.
+
+    Runs that made no more trials, and failed runs, stay as they are. ``curves`` are those of
+    :func:`improvements`. A run without a completed trial so far is a failed run.
+    """
+    longer = (runs.status == "ok") & (runs.trials > trials).fillna(False)
+    steps = [curves[run_id] for run_id in runs.run_id[longer]]
+    best = [float(best_after(of, trials)) for of in steps]
+    last = [float(best_after((of[0], of[0]), trials)) - 1 for of in steps]  # counted from 0
+    runs = runs.copy()
+    runs.loc[longer, [name for name in _AT_THE_END if name in runs]] = pd.NA
+    for name, values in (("reward", best), ("best_trial", last), ("trials", [trials] * len(best))):
+        if name in runs:
+            known = pd.Series(values, runs.index[longer], dtype=np.float64)
+            runs.loc[longer, name] = known.astype("Int64")  # NaN becomes missing
+    unsolved = longer & runs.reward.isna()
+    runs.loc[unsolved, "status"] = "infeasible"
+    runs.loc[unsolved, "reason"] = f"no completed trial in the first {trials}"
+    return runs
+
+
+def _by_trial(runs: pd.DataFrame) -> pd.Series:
+    """Return whether the method of each run uses the reward of each trial."""
+    return runs.information.str.contains(Information.REWARD_BY_TRIAL.value, regex=False)
 
 
 def solved(runs: pd.DataFrame) -> pd.DataFrame:
@@ -150,7 +197,7 @@ def check_study(study: object) -> None:
     _ = study.world
 
 
-def load(folder: str | Path, *, against: str = "") -> Study:
+def load(folder: str | Path, *, against: str = "", after: int | None = None) -> Study:
     """Read a results folder.
 
     Parameters
@@ -162,6 +209,9 @@ def load(folder: str | Path, *, against: str = "") -> Study:
     against : str
         Id, label or title of a method of the folder, with which table ``differences`` compares the
         other methods. By default, :func:`.list_differences` chooses the method.
+    after : int, optional
+        Number of trials of each run after which the study looks (:attr:`Study.after`). By default
+        it looks at whole runs.
 
     Returns
     -------
@@ -172,7 +222,8 @@ def load(folder: str | Path, *, against: str = "") -> Study:
     ------
     CoarticError
         The folder is not a results folder, the folder cannot be read, runs of its suite are
-        missing, or ``against`` does not name exactly one method.
+        missing, ``against`` does not name exactly one method, or the runs do not have ``after``
+        trials in a world without noise (:func:`after_trials`).
     TypeError
         The folder is neither a string nor a path.
 
@@ -180,6 +231,7 @@ def load(folder: str | Path, *, against: str = "") -> Study:
     --------
     >>> study = load("results/comparison")  # doctest: +SKIP
     >>> study.runs.groupby("label").gap.mean()  # doctest: +SKIP
+    >>> early = load("results/comparison", after=100)  # doctest: +SKIP
     """
     folder = results_folder(folder)
     with open_results(folder) as store:
@@ -195,7 +247,94 @@ def load(folder: str | Path, *, against: str = "") -> Study:
         place = folder if str(folder) in SHIPPED_SUITES else folder.absolute()
         study = Study(place, plan, store.made_with(), runs, store.marks(), imports=store.imports(),
                       asked=store.contrasts())  # fmt: skip
-    return replace(study, against=_label_in(study, against)) if against else study
+    study = replace(study, against=_label_in(study, against)) if against else study
+    return study if after is None else after_trials(study, after)
+
+
+def after_trials(study: Study, trials: int) -> Study:
+    """Return a study of what is known of each run after its first trials.
+
+    It has the best trial so far of each run that made more trials, and other runs as they are
+    (:attr:`Study.after`). It leaves out
+
+    - worlds with motor noise, where the best trial so far says nothing of the answer;
+    - methods whose answer is not their best trial, such as a learner from the rewards of subtasks;
+    - contrasts of the folder that are only about these, need an execution, or are read after more
+      trials.
+
+    Parameters
+    ----------
+    study : Study
+        A study of whole runs.
+    trials : int
+        Number of trials, at least 1.
+
+    Raises
+    ------
+    CoarticError
+        ``trials`` is no such number, a run of a method with a number of trials made fewer, or
+        nothing is left.
+    """
+    if type(trials) is not int or trials < 1:
+        raise CoarticError(f"after is {brief_value(trials)}; it must be a number of trials from 1")
+    check_after(study.plan, trials)
+    plan = [job for job in study.plan if not job.cell.model.motor_noise]
+    worlds = {job.cell.world for job in plan}
+    stored = _labelled(study.stored[study.stored.world.isin(worlds)])
+    counted = {job.cell.label for job in plan if job.cell.trials}
+    practised = stored[_by_trial(stored) & stored.label.isin(counted) & (stored.status == "ok")]
+    made = practised.set_index("label").trials.dropna()
+    if len(made) and made.min() < trials:
+        raise CoarticError(_FEWER.format(trials, made.idxmin(), made.min(), made.min()))
+    longer = stored[(stored.status == "ok") & (stored.trials > trials)]
+    curves = improvements(replace(study, plan=plan, stored=study.stored.loc[stored.index]))
+    best = [curves[run_id][1][-1] if run_id in curves else math.nan for run_id in longer.run_id]
+    other = {*longer.label[longer.reward.to_numpy(np.float64, na_value=np.nan) != best]}
+    plan = [job for job in plan if job.cell.label not in other]
+    kept = stored.index[~stored.label.isin(other)]
+    if not plan:
+        raise CoarticError(
+            "the answers of all methods are other than their best trials: leave out after"
+        )
+    places = places_of(job for job in plan if job.of_suite)
+    return replace(
+        study,
+        plan=plan,
+        stored=study.stored.loc[kept],
+        against=study.against if study.against in {*stored.label[kept]} else "",
+        asked=[
+            record
+            for record in study.asked
+            if record.contrast.quantity in OF_CURVE
+            and (record.contrast.after or 0) <= trials
+            and planned_cells(record.contrast, places)
+        ],
+        after=trials,
+        whole=study,
+    )
+
+
+_FEWER = "after is {}, but a run of {} has {} trials: give at most {}"
+
+
+def check_after(plan: Sequence[Job], trials: int) -> None:
+    """Raise CoarticError if no study after a number of trials can be made of a plan.
+
+    The plan has only runs with motor noise, or a method without noise is asked for fewer trials.
+    """
+    quiet = [job.cell for job in plan if not job.cell.model.motor_noise]
+    if not quiet:
+        raise CoarticError(
+            "all runs are in worlds with motor noise, where the best trial so far says nothing of "
+            "the answer: leave out after"
+        )
+    counts = {
+        cell.trials: cell.label
+        for cell in quiet
+        if cell.trials and Information.REWARD_BY_TRIAL in cell.method.information
+    }
+    if counts and (fewest := min(counts)) < trials:
+        raise CoarticError(_FEWER.format(trials, counts[fewest], fewest, fewest))
 
 
 def _label_in(study: Study, name: str) -> str:
@@ -255,6 +394,13 @@ class Study:
     elsewhere: pd.DataFrame = field(default_factory=pd.DataFrame)
     """Rows like those of :attr:`methods`, for methods that have runs only in other worlds of the
     folder. Table ``not-ranked`` lists them, except searches for the optimum."""
+    after: int | None = None
+    """Number of trials of each run after which the study looks; None for whole runs. Rewards and
+    numbers of trials, and what is computed of them, are then of the first trials. Best known
+    rewards are those of whole runs, and so are methods without trials. Hands and other costs of
+    runs that made more trials are not known, and no solution is (:meth:`executed`)."""
+    whole: Study | None = None
+    """The study of whole runs from which a study after some trials is made; otherwise None."""
 
     @contextmanager
     def _opened(self) -> Iterator[Store]:
@@ -274,6 +420,14 @@ class Study:
         """Return a dict of the fields of the study for pickle, without cached values."""
         return {stored.name: getattr(self, stored.name) for stored in fields(self)}
 
+    def _check_whole(self) -> None:
+        """Raise CoarticError if this is no study of whole runs, whose solutions are known."""
+        if self.after is not None:
+            raise CoarticError(
+                f"the study is after {pluralize(self.after, 'trial')}, but solutions are those of "
+                "whole runs: load it without after"
+            )
+
     @property
     def suite(self) -> str:
         """Name of the suite that was run."""
@@ -289,6 +443,7 @@ class Study:
         study of one world, the only value is the study itself.
         """
         names = sorted({job.cell.world: None for job in self.plan}, key=bool)  # the paper's first
+        whole = self.whole.worlds if self.whole else {}
         if len(names) == 1:
             return {names[0]: self}
         labelled = _labelled(self.stored)
@@ -309,6 +464,8 @@ class Study:
                 self.against if self.against in here else "",
                 {name: self.imports[name] for name in self.imports if name in used},
                 elsewhere=methods.loc[others],
+                after=self.after,
+                whole=whole.get(world),
             )
         return studies
 
@@ -403,6 +560,9 @@ class Study:
         executions. Their noise differs from the noise with which runs are judged. Raises
         CoarticError for a study of several worlds.
         """
+        if self.whole:
+            of_whole = self.whole.worlds[self.world].optima
+            return {name: of_whole[name] for name in self.tasks if name in of_whole}
         runs, tasks = self.stored, self.tasks.values()
         if self.is_noisy:
             with self._opened() as store:
@@ -540,6 +700,8 @@ class Study:
             runs.attrs["units"] = UNITS
             return runs
         runs, cells = _labelled(self.stored), [job.cell for job in self.plan]
+        if self.after is not None:
+            runs = _cut(runs, improvements(self), self.after)
         runs["value"] = run_values(runs)
         runs["note"] = ["; ".join(self.marks.get(name, ())) for name in runs.method]
         rows = [
@@ -551,15 +713,14 @@ class Study:
                 "split": cell.task.split,
                 "goals": len(cell.task.goals),
                 "arms": len(cell.task.hands),
-                "budget": cell.trials,
+                "budget": cell.trials if self.after is None else cell.trials and self.after,
             }
             for cell in cells
         ]
         keys = pd.MultiIndex.from_tuples([(cell.task.name, cell.label) for cell in cells])
         more = pd.DataFrame(rows, keys)
         runs = runs.join(more[[name for name in more if name not in runs]], on=["task", "label"])
-        by_trial = runs.information.str.contains(Information.REWARD_BY_TRIAL.value, regex=False)
-        runs["budget"] = runs.budget.where(by_trial).astype("Int64")
+        runs["budget"] = runs.budget.where(_by_trial(runs)).astype("Int64")
         as_it_is = restrictions(runs).base == BASE  # other runs solve another task
         best = {name: optimum.reward for name, optimum in self.optima.items()}
         known = runs.task.map(best).where(as_it_is)
@@ -673,12 +834,13 @@ class Study:
         The columns are ``run_id``, ``order``, ``goal``, ``hand``, ``kind``, ``ticks`` and ``path``
         (docs/results.md).
         """
+        self._check_whole()
         with self._opened() as store:
             solutions = store.solutions()
         return solutions[solutions.run_id.isin(self.stored.run_id)].reset_index(drop=True)
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the rewards of all trials of each run with stored rewards.
+        """Yield the rewards of all trials (:attr:`after`) of each run with stored rewards.
 
         Yields
         ------
@@ -691,7 +853,7 @@ class Study:
         with self._opened() as store:
             for run_id, rewards in store.rewards():
                 if run_id in ids:  # others are in another world
-                    yield run_id, rewards
+                    yield run_id, rewards[: self.after]
 
     def executed(self, task: str, method: str, *, replay: bool = False) -> Solutions:
         """Execute the solved runs of a method on a task again, without motor noise.
@@ -720,10 +882,11 @@ class Study:
         Raises
         ------
         CoarticError
-            The study has no runs of the method on the task or has several worlds, the stored
-            movements cannot be executed, or (in a world without noise) their ticks differ from the
-            stored ticks.
+            The study has no runs of the method on the task or has several worlds, it is not of
+            whole runs (:attr:`after`), the stored movements cannot be executed, or (in a world
+            without noise) their ticks differ from the stored ticks.
         """
+        self._check_whole()
         condition = f"{METHOD_PREFIX}{method}"  # conditions of the learner can be short: EC4
         if (task, method) not in shared_cells(self) and (task, condition) in shared_cells(self):
             method = condition
@@ -857,12 +1020,17 @@ class Study:
         Raises
         ------
         CoarticError
-            The study has no such runs or several worlds, or no quantity has this name.
+            The study has no such runs or several worlds, no quantity has this name, or the
+            quantity is not known after so many trials (:attr:`Study.after`).
         """
         if quantity in SIGNATURES:
             return self.signature(quantity, task, method)
         if quantity not in QUANTITIES:
             raise CoarticError(unknown("quantity", quantity, QUANTITIES))
+        if quantity not in OF_CURVE:
+            self._check_whole()
+        if self.after is not None and (after or 0) > self.after:
+            raise CoarticError(f"after is {after}, but the study is after {self.after} trials")
         runs, alone = shared_cells(self)[task, method], self.corrective_best[task]
         values = runs.value.astype(np.float64)
         if after is not None and runs.budget.notna().all():
@@ -936,6 +1104,7 @@ class Study:
         ``part`` is ``"solution"`` or ``"replay"``. Only the first 500 solved runs of each method on
         each task are included. For ``"replay"``, runs without a replay are left out.
         """
+        self._check_whole()
         if part not in self._movements:
             ids = {*self.stored.run_id}
             with self._opened() as store:
@@ -1137,6 +1306,16 @@ def ending_of(study: Study) -> str:
     """
     worlds = [*study.worlds]
     return f"-{slugs(worlds)[worlds[0]]}" if len(worlds) == 1 and worlds[0] else ""
+
+
+def when_of(study: Study) -> str:
+    """Return the end of a title for a study after some trials, such as ``, after 100 trials``.
+
+    It is empty for a study of whole runs.
+    """
+    if study.after is None:
+        return ""
+    return f", after {number(study.after)} trial{'s' * (study.after > 1)}"
 
 
 def _stored_of(study: Study) -> pd.DataFrame:

@@ -546,15 +546,16 @@ PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluati
     "What it costs to come near",
     f"Share of {len(TARGETS)} reward targets reached within a budget. Targets are evenly spaced "
     "from the corrective process alone, with its best hands, to the {reference}; a run counts for "
-    "each target that it reached. Forward-kinematics evaluations are spread evenly over a run's "
-    f"trials. Bands: {style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",
+    f"each target that it reached. Bands: {style.COVERAGE} bootstrap intervals over runs. n = "
+    "{n} runs of a method.",
 )
 def draw_runtimes(study: Study) -> Parts | None:
     """Draw the share of targets that methods reach within a budget.
 
     The curves are ECDFs of running times (:func:`.runtimes`). In one panel, the budgets are numbers
-    of trials; in the other panel, the budgets are numbers of forward-kinematics evaluations. A
-    panel without a curve is left out. The result is None if there is no curve.
+    of trials; in the other panel, the budgets are numbers of forward-kinematics evaluations, which
+    are known only of whole runs. A panel without a curve is left out. The result is None if there
+    is no curve.
 
     Curves are drawn for the following methods among those that represent their algorithms
     (:func:`.headline_methods`), without the corrective process alone:
@@ -574,7 +575,7 @@ def draw_runtimes(study: Study) -> Parts | None:
     curves = rows.index[(rows.information == BY_TRIAL) | ~rows.built_in | (rows.index == best)]
     data = runtimes(study)
     shown = data.method.isin(curves) & (data.budget > 0) & (data.budget < math.inf)
-    data = data[shown & data.spend.isin(PANELS)]
+    data = data[shown & data.spend.isin(["trials"] if study.after else PANELS)]
     if data.empty:
         return None
     steps = []
@@ -640,7 +641,10 @@ def draw_runtimes(study: Study) -> Parts | None:
         )  # fmt: skip
     shares = spoken(study, ends, "{title} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
-    return drawing, data, alt, (" Means over all tasks." if len(target_ranges(study)) > 1 else "")
+    more = " Means over all tasks." if len(target_ranges(study)) > 1 else ""
+    if "forward_kinematics" in spends:
+        more += " Forward-kinematics evaluations are spread evenly over a run's trials."
+    return drawing, data, alt, more
 
 
 CURVES = (*LEARNERS, RANDOM_SEARCH, "hill-climbing", "cma-es/bandit", "policy-gradient")

@@ -31,7 +31,7 @@ from coartic.analysis.methods import (
     describe_values,
 )
 from coartic.analysis.standings import reference
-from coartic.analysis.study import Study, check_study, ending_of
+from coartic.analysis.study import Study, check_study, ending_of, when_of
 from coartic.analysis.words import RECONSTRUCTED, capital, id_of, number
 from coartic.errors import CoarticError
 from coartic.internal.files import describe_os_errors
@@ -113,7 +113,8 @@ def figure(
 
     - a figure in the style of all figures;
     - the id, followed by the suffix of the world (:func:`.ending_of`);
-    - the title, followed by the name of the world if it is not the paper's;
+    - the title, followed by the name of the world if it is not the paper's, and by the number of
+      trials after which the study looks (:attr:`.Study.after`), except for a figure of tasks;
     - the caption, followed by the text that the drawing function returns. If the figure has a
       dagger, a sentence that explains the dagger follows.
 
@@ -151,6 +152,8 @@ def figure(
             heading = title
             if not of_folder and study.world:
                 heading = f"{title}, in {world_title(study.world)}"
+            if id_of(draw) != "tasks":
+                heading += when_of(study)
             words = words.replace("{n}", n).replace("{reference}", to)
             return Plot(name, heading, words, alt, drawing, data)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import os
+import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, metadata
@@ -19,10 +20,17 @@ from coartic.analysis.figures.plot import FIGURES, Plot, for_page, panels_for_pa
 from coartic.analysis.figures.style import ONE
 from coartic.analysis.report import sections
 from coartic.analysis.report.player import player
-from coartic.analysis.report.sections import IN_NOISE, QUESTIONS, SECTIONS, Section
+from coartic.analysis.report.sections import (
+    IN_NOISE,
+    QUESTIONS,
+    SECTIONS,
+    Section,
+    words_after,
+)
 from coartic.analysis.standings import neighbours, reference
-from coartic.analysis.study import Study, ending_of
+from coartic.analysis.study import Study, ending_of, when_of
 from coartic.analysis.tables import (
+    SOLUTIONS_ONLY,
     TABLES,
     Table,
     caption_of,
@@ -97,8 +105,8 @@ def write_report(
     CoarticError
         - ``folder`` cannot be written, or another process is writing a report into it.
         - ``folder`` contains the results themselves.
-        - ``folder`` already has a report of other results. (If ``folder`` is inside the results
-          folder, this is not checked.)
+        - ``folder`` already has a report of other results (if ``folder`` is inside the results
+          folder, this is not checked), or of the same after another number of trials.
         - ``folder`` contains a file that has the name of a file of the report, but was not written
           by coartic.
         - The results cannot be read, or a stored run cannot be executed again
@@ -111,19 +119,22 @@ def write_report(
     make_folder(folder, ["report.html"])
     with lock(folder, command="coartic report"):
         home, report = os.path.relpath(study.folder, folder), folder / "report.html"
+        with describe_os_errors(report):
+            head = report.read_text("utf-8").partition("<title>")[0] if report.exists() else ""
         if study.folder.absolute() in folder.absolute().parents:
             check_inside(study.folder, folder)
-        else:
-            with describe_os_errors(report):
-                head = report.read_text("utf-8").partition("<title>")[0] if report.exists() else ""
-            if head and f'-results" content="{home}"' not in html.unescape(head):
-                raise CoarticError(
-                    f"{folder} holds the report of other results; choose another folder"
-                )
+        elif head and f'-results" content="{home}"' not in html.unescape(head):
+            raise CoarticError(f"{folder} holds the report of other results; choose another folder")
+        after = re.search(r'-after" content="(\d+)"', head)
+        if head and (after and after[1]) != (study.after and str(study.after)):
+            held = f"after {after[1]} trials" if after else "of whole runs"
+            raise CoarticError(f"{folder} holds the report {held}; choose another folder")
         failures: dict[str, str] = {}
         sections_of_all = [*SECTIONS, *([own] if own else [])]
         names = {table.id: section.title for section in sections_of_all for table in section.tables}
         tables = TABLES | ({table.id: table for table in own.tables} if own else {})
+        if study.after:
+            tables = {name: table for name, table in tables.items() if name not in SOLUTIONS_ONLY}
         shown, first = list[dict[str, Any]](), list[Plot]()
         frames = defaultdict[str, dict[str, pd.DataFrame]](dict)
         texts, files = defaultdict[str, list[str]](list), {"report.html": b""}
@@ -268,13 +279,13 @@ def _first_figures(study: Study) -> list[Plot]:
     figure:
 
     - the figure of the postures at a goal that two tasks share (:func:`.draw_shared_goal`), if all
-      individual tasks are tasks of the paper, and there is such a goal;
+      individual tasks are tasks of the paper, there is such a goal, and the study is of whole runs;
     - otherwise the figure of the tasks.
 
     A figure for which the study has no runs or tasks is left out.
     """
     draws = [draw_tasks]
-    if study.individual_tasks.keys() <= shipped_tasks().keys():
+    if study.individual_tasks.keys() <= shipped_tasks().keys() and not study.after:
         draws.insert(0, draw_shared_goal)
     others = (draw(study, width=ONE) for draw in draws if study.varied.empty)
     return [plot for plot in (draw_ranking(study, width=ONE), next(filter(None, others), None))
@@ -284,11 +295,15 @@ def _first_figures(study: Study) -> list[Plot]:
 def _heading_of(study: Study) -> str:
     """Return a heading for the page.
 
-    The heading names the tasks if there are at most three, otherwise the suite.
+    The heading is the title of a user's suite. Otherwise it names the tasks if there are at most
+    three, and the suite if there are more.
     """
+    when = when_of(study)
+    if study.question[0]:
+        return f"{study.question[0]}{when}"
     tasks = [marked(task) for task in study.tasks.values()]
     subject = listed(tasks) if len(tasks) <= 3 else f"suite {study.suite}"
-    return f"Coarticulation of a simulated robot: {subject}"
+    return f"Coarticulation of a simulated robot: {subject}{when}"
 
 
 def _sections_shown(
@@ -363,7 +378,9 @@ def _page(
     with open_results(study.folder) as store:
         versions = store.versions()
     return environment.get_template("page.html.jinja").render(
-        title=study.question[0] or _heading_of(study),
+        title=_heading_of(study),
+        after=study.after,
+        words_after=words_after(study),
         question=study.question[1],
         styles=(HERE / "page.css").read_text("utf-8") + part_of_page("play.css"),
         player=sections.attempt(failures, "Film", player, main) or "",
@@ -382,7 +399,7 @@ def _page(
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
         date=made_with["date"][:10],
         not_ranked=[line for of in study.worlds.values() for line in sections.failed_methods(of)],
-        limits=sections.limits(main) | sections.failures_in(study.stored),
+        limits=sections.limits(main) | sections.failures_in(study.runs),
         worlds=[*map(world_title, study.worlds)] if [*study.worlds] != [""] else [],
         in_noise=IN_NOISE if any(of.is_noisy for of in study.worlds.values()) else "",
         conditions={*study.methods.condition},

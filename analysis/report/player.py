@@ -28,7 +28,8 @@ def player(study: Study) -> str:
 
     For each of these methods, a preset has the run whose reward is nearest to the median. The
     result is the empty string if there is no preset. It is also empty in another world than the
-    paper's, because the script of the figure only knows the paper's model.
+    paper's, because the script of the figure only knows the paper's model, and after some trials
+    (:attr:`.Study.after`).
 
     The method that the figure shows first is
 
@@ -40,7 +41,7 @@ def player(study: Study) -> str:
     - otherwise the first method of the first preset.
     """
     presets, first = [], ""
-    if study.world:
+    if study.world or study.after:
         return ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
         (up, down), first = shared.tasks, shared.method

@@ -48,8 +48,9 @@ from coartic.analysis.standings import (
     solved_tasks,
     standings,
 )
-from coartic.analysis.study import Study, ending_of, shared_cells
+from coartic.analysis.study import Study, ending_of, shared_cells, when_of
 from coartic.analysis.tables import (
+    SOLUTIONS_ONLY,
     Table,
     answer_lines,
     is_setting,
@@ -351,9 +352,55 @@ def visible_sections(study: Study) -> list[Section]:
     """Return the sections of the page for a study.
 
     Sections about individual tasks (:attr:`Section.single`) are left out if the study has no
-    individual tasks.
+    individual tasks, and sections about solutions (:data:`.SOLUTIONS_ONLY`) after some trials.
     """
-    return [section for section in SECTIONS if study.individual_tasks or not section.single]
+    return [
+        section
+        for section in SECTIONS
+        if (study.individual_tasks or not section.single)
+        and not (study.after and SOLUTIONS_ONLY & {table.id for table in section.tables})
+    ]
+
+
+def words_after(study: Study) -> list[str]:
+    """Return sentences on a study after some trials: what its numbers are, and what it leaves out.
+
+    The list is empty for a study of whole runs.
+    """
+    if study.after is None:
+        return []
+    return [
+        f"Rewards are those {when_of(study).removeprefix(', ')} of each run, and those of methods "
+        "without trials as they are. A run that is asked for so few trials can differ, because "
+        "some methods plan with their number.",
+        "Solutions are those of whole runs: section Coarticulation, the films and table saved are "
+        "left out, and so are hands and costs of runs that made more trials.",
+        *left_out(study),
+    ]
+
+
+def left_out(study: Study) -> list[str]:
+    """Return sentences on the worlds, methods and questions that a study after trials lacks."""
+    if (whole := study.whole) is None:
+        return []
+    sentences, here = [], {*study.worlds}
+    if noisy := [world_title(world) for world in whole.worlds if world not in here]:
+        sentences.append(
+            f"{capital(listed(noisy))} {'are' if noisy[1:] else 'is'} left out: with motor noise "
+            "the best trial so far says nothing of the answer."
+        )
+    quiet = [of for of in whole.worlds.values() if not of.is_noisy]
+    missing = [of.runs[~of.runs.run_id.isin(study.stored.run_id)].ranked_as for of in quiet]
+    titles = [of.methods.title[[*rows.unique()]] for of, rows in zip(quiet, missing, strict=True)]
+    if others := [*dict.fromkeys(chain.from_iterable(titles))]:
+        are = "are" if others[1:] else "is"
+        sentences.append(f"{listed(others)} {are} left out: the answer is not the best trial.")
+    answered = {record.contrast.name for record in study.asked}
+    questions = [record.contrast for record in whole.asked]
+    if open_ones := [asked.says.rstrip(".") for asked in questions if asked.name not in answered]:
+        when = when_of(study).removeprefix(", ")
+        sentences.append(f"Not answered {when}: {'; '.join(open_ones)}.")
+    return sentences
 
 
 def attempt(

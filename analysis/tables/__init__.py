@@ -49,11 +49,15 @@ from coartic.analysis.tables.random_tasks import gaps_by_family, instance_runs, 
 from coartic.analysis.tables.listings import list_failed, list_methods, list_tasks
 # isort: on
 
+SOLUTIONS_ONLY = frozenset(table.id for table in (list_contexts, list_signatures, list_saved))
+"""Ids of the tables about solutions, which are not known after some trials of a run."""
+
 __all__ = [
     "BUDGETS",
     "COSTS",
     "ROUNDING",
     "SHORT_ID",
+    "SOLUTIONS_ONLY",
     "TABLES",
     "Column",
     "ShownColumn",

@@ -38,7 +38,7 @@ from coartic.analysis.standings import (
     ranked_tasks,
     reference,
 )
-from coartic.analysis.study import Study, check_study, ending_of
+from coartic.analysis.study import Study, check_study, ending_of, when_of
 from coartic.analysis.words import (
     NARROW_SPACE,
     NONE,
@@ -231,13 +231,15 @@ def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
 def caption_of(table: Table, study: Study) -> str:
     """Return the caption of a table with the placeholders replaced (:attr:`Table.caption`).
 
-    In another world than the paper's, the name of the world is added in parentheses.
+    In another world than the paper's, the name of the world is added in parentheses. A number of
+    trials (:attr:`.Study.after`) is added to the captions of tables about runs.
     """
+    when = "" if table.id == "tasks" else when_of(study)
     if table.of_folder:
-        return table.caption
+        return table.caption + when
     caption = table.caption.replace("{tasks}", pluralize(len(ranked_tasks(study)), "task"))
     caption = caption.replace("{reference}", reference(study, study.optima))
-    return caption + (f" ({world_title(study.world)})" if study.world else "")
+    return caption + when + (f" ({world_title(study.world)})" if study.world else "")
 
 
 def csv_of_worlds(frames: Mapping[str, pd.DataFrame]) -> str:

@@ -99,6 +99,7 @@ def list_methods(study: Study) -> Rows:
         if task not in places:
             continue
         good = solved(runs)
+        hands = good.hands.dropna()  # missing after some trials of longer runs
         rewards = good.value.to_numpy(np.float64)
         row = named(study, runs) | {
             "solved": len(good),
@@ -106,7 +107,7 @@ def list_methods(study: Study) -> Rows:
             "reward_sd": standard_deviation(rewards),
             "reward_median": np.median(rewards) if len(good) else math.nan,
             "gap": good.gap.mean(),
-            "hands": tally(good.hands) if len(good) > 1 else "".join(good.hands),
+            "hands": tally(hands) if len(hands) > 1 else "".join(hands),
             "trials": runs.trials.astype(float).median(),
             "forward_kinematics": runs.forward_kinematics.astype(float).median(),
             "solve_s": solve_times(good).astype(float).median(),

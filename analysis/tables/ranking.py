@@ -108,8 +108,9 @@ def _mean_gap_after(study: Study, trials: int) -> pd.Series:
     The gap of a run is the gap of its best trial among the first ``trials`` trials. If the rewards
     of the trials of a run are not stored, the final gap of the run is used. The result is the mean
     over tasks of the mean over runs. It is NaN for a method if one of its runs had not found a
-    solution by then. In a world with noise, where the best trial so far is partly luck, the result
-    is NaN for all methods. The Series is indexed by the labels of the rows of the ranking.
+    solution by then, or if the study looks at fewer of its trials (:attr:`.Study.after`). In a
+    world with noise, where the best trial so far is partly luck, the result is NaN for all methods.
+    The Series is indexed by the labels of the rows of the ranking.
     """
     runs = compared_runs(study)
     if study.is_noisy:
@@ -122,6 +123,8 @@ def _mean_gap_after(study: Study, trials: int) -> pd.Series:
         for run_id, reward in zip(runs.run_id, runs.reward.astype(float), strict=True)
     ]
     gaps = pd.Series(relative_gap(best, runs.best_known.astype(float)), runs.index)
+    if study.after is not None and study.after < trials:
+        gaps = gaps.where(runs.hands.notna())  # missing of runs that made more trials
     cells = gaps.groupby([runs.ranked_as, runs.task])
     by_task = cells.mean().where(cells.count() == cells.size())
     methods = by_task.groupby(level=0)

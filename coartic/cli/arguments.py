@@ -17,6 +17,7 @@ import typer
 from coartic.cli.completion import Words
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
+from coartic.internal.limits import MAX_TRIALS
 from coartic.internal.text import BACKWARDS, unknown
 
 if TYPE_CHECKING:
@@ -88,6 +89,12 @@ def ranged_option(option: str, what: str, least: float, most: float) -> Any:
         Smallest and largest allowed value.
     """
     return typer.Option(option, min=least, max=most, metavar="N", help=what)
+
+
+After = Annotated[
+    int | None,
+    ranged_option("--after", "Rank after the first N trials of each run.", 1, MAX_TRIALS),
+]
 
 
 def parse_run_range(text: str) -> Any:

@@ -62,6 +62,7 @@ def report(
         Path | None,
         given.option("FILE", "Questions about these results: a TOML file with [[contrasts]]."),
     ] = None,
+    after: given.After = None,
 ) -> None:
     """Write the report of a results folder."""
     if width is not None and not for_paper:
@@ -69,11 +70,12 @@ def report(
     from coartic.runs.shipped import SHIPPED_SUITES
 
     if out is None:  # shipped results have no folder; Git ignores `results` in a checkout
-        out = Path("results" if str(folder) in SHIPPED_SUITES else "") / folder / "report"
+        home = Path("results" if str(folder) in SHIPPED_SUITES else "") / folder
+        out = home / _report_name(after)
     from coartic.analysis import TABLES
     from coartic.analysis.report.build import write_report
     from coartic.analysis.report.own import own_section
-    from coartic.analysis.study import load, with_contrasts
+    from coartic.analysis.study import after_trials, load, with_contrasts
 
     section = own_section(own or [])
     started = time.monotonic()
@@ -84,6 +86,7 @@ def report(
         display.show(f"Reading {folder}")
         study = load(str(folder), against=against or "")
         study = study if contrasts is None else with_contrasts(study, contrasts)
+        study = study if after is None else after_trials(study, after)
         differences = map(TABLES["differences"], study.worlds.values())
         if against and not any(map(len, differences)):
             raise CoarticError(
@@ -106,20 +109,28 @@ def report(
         sys.exit(1)
 
 
+def _report_name(after: int | None) -> str:
+    """Return the name of the folder of a report, of whole runs or after a number of trials."""
+    return "report" if after is None else f"report-after-{after}"
+
+
 def say_ranking(study: Study, folder: Path) -> None:
     """Print the ranking of each world, the answers to contrasts, and the command for a report.
 
-    Each ranking has the name of its world as a heading, unless the folder contains only runs in the
-    paper's world. Contrasts that need executions of solutions are left to the report. ``folder`` is
-    the results folder of the study.
+    Each ranking has the name of its world and the number of trials after which the study looks as a
+    heading, unless it is of whole runs, all in the paper's world. Contrasts that need executions of
+    solutions are left to the report. ``folder`` is the results folder of the study.
     """
+    from coartic.analysis.report.sections import left_out
+    from coartic.analysis.study import when_of
     from coartic.analysis.tables import answer_lines, needs_executions
     from coartic.analysis.words import capital
     from coartic.runs.plan import world_title
 
     has_headings = [*study.worlds] != [""]
     for world, of_world in study.worlds.items():
-        say(*([f"{capital(world_title(world))}:"] if has_headings else []))
+        heading = (world_title(world) if has_headings else "") + when_of(study)
+        say(*([f"{capital(heading.removeprefix(', '))}:"] if heading else []))
         _say_ranking_of_world(of_world)
         say(*([""] if has_headings else []))
     quick = [record for record in study.asked if not needs_executions(record.contrast.quantity)]
@@ -127,8 +138,10 @@ def say_ranking(study: Study, folder: Path) -> None:
     later = len(study.asked) - len(quick)
     lines += [f"{pluralize(later, 'sentence')} more: see the report"] if later else []
     say_pairs([("" if place else "Questions", line) for place, line in enumerate(lines)])
-    page = folder / "report" / "report.html"
-    say_pairs([("Report", f"`coartic report {quote(str(folder))}` writes {page}")])
+    say_pairs([("Left out" * (not place), line) for place, line in enumerate(left_out(study))])
+    page = folder / _report_name(study.after) / "report.html"
+    option = f" --after {study.after}" if study.after else ""
+    say_pairs([("Report", f"`coartic report {quote(str(folder))}{option}` writes {page}")])
 
 
 def _say_ranking_of_world(study: Study) -> None:

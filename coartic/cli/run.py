@@ -101,13 +101,14 @@ def run(
         list[str] | None,
         given.option("FOLDER", "Include the runs of a folder, or the results named 'shipped'."),
     ] = None,
+    after: given.After = None,
 ) -> None:
     """Run the missing part of a suite, and print the ranking.
 
     If the command is interrupted, repeat it. It continues where it stopped, and repeats runs that
     crashed. If --runs names a part of the runs, no ranking is printed.
     """
-    from coartic.analysis.study import load
+    from coartic.analysis.study import check_after, load
     from coartic.benchmarks.cluster import Dask
     from coartic.benchmarks.include import include_folders
     from coartic.benchmarks.planning import plan, request_for
@@ -122,6 +123,8 @@ def run(
         raise CoarticError(f"SUITE is missing: give {', '.join(suites())}, or a file (.toml)")
     if scheduler is not None and jobs is not None:
         raise CoarticError("--jobs has no effect with --scheduler, whose workers perform the runs")
+    if after is not None and isinstance(runs, range):
+        raise CoarticError("--after has no effect with a part of --runs, which prints no ranking")
     chosen, display = load_suite(suite), Display()
     out = own_folder(f"results/{chosen.name}" if folder is None else folder, "--out")
 
@@ -151,6 +154,8 @@ def run(
             display.show(f"Adding the runs of {' and '.join(include)}")
             asked = include_folders(asked, include, out, only, registered)
             display.line(f"Added the runs of {' and '.join(include)}.")
+        if after is not None:
+            check_after(asked, after)
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
         progress = perform(asked, out, executor=executor, watch=display.update)
     say(str(progress))
@@ -158,7 +163,7 @@ def run(
         part = f"`--include {quote(str(out))}`, with all other parts, joins them"
         say_pairs([("Next", f"{out} has runs {runs[0]} to {runs[-1]}: {part}")])
     else:
-        say_ranking(load(str(out)), out)
+        say_ranking(load(str(out), after=after), out)
     if progress.crashed:
         sys.exit(1)
 
