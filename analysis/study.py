@@ -539,9 +539,11 @@ class Study:
         """A dict that maps the name of each task to the task, in the order of the plan.
 
         Titles are changed where necessary, so that no two tasks have the same title
-        (:func:`.titled_apart`).
+        (:func:`.titled_apart`). In a study of one world, they have the goals' radius of this world.
         """
-        tasks = {job.cell.task.name: job.cell.task for job in self.plan}
+        is_one = len({job.cell.world for job in self.plan}) == 1
+        cells = [job.cell for job in self.plan]
+        tasks = {cell.task.name: cell.arena if is_one else cell.task for cell in cells}
         return {task.name: task for task in titled_apart(tasks.values())}
 
     @_Copied
@@ -709,6 +711,7 @@ class Study:
                 **cell.method.defaults,
                 **cell.parameters,
                 **{name: getattr(cell.model, name) for name in WORLD},
+                "radius": cell.arena.radius,
                 "family": cell.task.family,
                 "split": cell.task.split,
                 "goals": len(cell.task.goals),

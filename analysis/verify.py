@@ -60,7 +60,7 @@ def need(holds: Any, words: str) -> None:
         raise ValueError(words)
 
 
-WORLD = {"motor_noise": 0.0, "norm": "euclidean", "base_weight": 1.0}
+WORLD = {"motor_noise": 0.0, "norm": "euclidean", "base_weight": 1.0, "radius": None}
 """Constants of the paper's world. A stored cell leaves a constant out if it has this value."""
 
 # One bit of a hand's position can decide where a movement stops. Therefore it is computed in the
@@ -114,6 +114,8 @@ def stored_task(content: str) -> Any:
     cell = json.loads(content, object_hook=lambda values: SimpleNamespace(**values))
     task = cell.task
     task.model = SimpleNamespace(**WORLD | vars(cell.model))
+    if task.model.radius is not None:
+        task.radius = task.model.radius
     method, given = plain["method"], plain["parameters"]
     changed = [f"{n}={x}" for n, x in given.items() if repr(x) != repr(method["defaults"].get(n))]
     world = [f"{name}={x}" for name, x in vars(task.model).items() if x != WORLD.get(name, x)]

@@ -214,7 +214,7 @@ def _is_best_trial(run: Row) -> bool:
     rewards = [-inf if reward is None else reward for reward in run.rewards]
     if len({*rewards}) < 2:
         return False  # there was nothing to choose from
-    task, best = run.cell.task, max(rewards)
+    task, best = run.cell.arena, max(rewards)
     worlds = noise_draws(noise_seed(run["seed"]), rewards.index(best))
     answer = next_action(run.part("solution"))
     (execution,) = execute_many(compiled_task(task, run.cell.model), [answer], worlds)

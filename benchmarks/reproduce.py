@@ -60,7 +60,7 @@ def trajectory_of(run: Row) -> Trajectory:
     if "solution" not in run.movements:
         reason = f"{run['status']}, {run['reason']}"
         raise CoarticError(f"run {run['run_id']} has no solution to show: {reason}")
-    task, movements = run.cell.task, run.part("solution")
+    task, movements = run.cell.arena, run.part("solution")
     exact = run.cell.model.without_noise()
     try:
         if error := too_long(task, movements, exact):

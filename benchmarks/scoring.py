@@ -42,7 +42,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Row]:
     imports = {} if method.is_ours else {"imports": method.packages}
     stated = [_answer_of(outcome) if is_noisy else outcome.parts for outcome in outcomes]
     solutions = [movements for parts in stated for movements in parts.values()]
-    executions = iter(execute_all(cell.task, solutions, cell.model))
+    executions = iter(execute_all(cell.arena, solutions, cell.model))
     runs = []
     for number, outcome, asked in zip(job.numbers, outcomes, stated, strict=True):
         parts = {part: next(executions) for part in asked}

@@ -141,7 +141,7 @@ def perform_job(job: Job) -> list[Outcome]:
     cell, name = job.cell, job.cell.method.name
     sessions = [
         Session(
-            cell.task,
+            cell.arena,
             job.run_seed(number),
             # the declared information, because a method could change its class
             map(Information, cell.method.information),
@@ -160,7 +160,7 @@ def perform_job(job: Job) -> list[Outcome]:
     try:
         method = cell.method.configure(cell.parameters)
         results: Sequence[Any]
-        outline = outline_of(cell.task)
+        outline = outline_of(cell.arena)
         reason_not = method.refuses(cell.model) or reason_against(method, outline)
         if cell.method.is_ours:
             reason_not = reason_not or reason_against_named(cell.parameters, outline, cell.model)

@@ -13,9 +13,10 @@ scoring. It is increased with each change of this code that changes results."""
 PAPER_RADIUS = 0.1
 """θ^g: radius of the goals of the paper's tasks (in length units)."""
 Norm = Literal["euclidean", "maximum"]
-WORLD = ("motor_noise", "norm", "base_weight")
-"""Names of the constants that define a *world*, that is, the cost of movements and their motor
-noise. The other constants of a motion model belong to the rules of the paper's robot."""
+WORLD = ("motor_noise", "norm", "base_weight", "radius")
+"""Names of the constants that define a *world*, that is, the cost of movements, their motor noise
+and the size of the goals. The other constants of a motion model belong to the rules of the paper's
+robot."""
 
 
 class MotionModel(NamedTuple):
@@ -70,10 +71,14 @@ class MotionModel(NamedTuple):
     The weight changes only the cost of moving the base; exploration, corrective process and
     tolerances do not depend on it."""
 
+    radius: float | None = None
+    """θ^g: radius of the goals, in length units. None stands for the radius of each task."""
+
     def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
         """Return a copy in which tolerances that are None are replaced by numbers.
 
-        The number is a tenth of ``radius``, the radius of the goals (in length units).
+        The number is a tenth of the goals' radius: that of the model, or else ``radius`` (in length
+        units).
 
         Examples
         --------
@@ -86,9 +91,11 @@ class MotionModel(NamedTuple):
     def tolerances(self, radius: float) -> tuple[float, float]:
         """Return the tolerances of arrival and of correction, in length units.
 
-        ``radius`` is the radius of the goals, in length units. If a tolerance of the model is None,
-        a tenth of ``radius`` is returned for it.
+        If a tolerance of the model is None, a tenth of the goals' radius is returned for it.
+        ``radius`` is the radius of the task's goals, in length units; the radius of the model, if
+        there is one, takes its place.
         """
+        radius = radius if self.radius is None else self.radius
         tenth, arrival, correction = radius / 10, self.arrival_tolerance, self.correction_tolerance
         return (
             tenth if arrival is None else arrival,
@@ -123,7 +130,9 @@ _BOUNDS = {
     "max_iterations": (0, 10**9),
     "motor_noise": (0.0, 100.0),
     "base_weight": (1e-6, 1e3),  # the base then takes 100,000 ticks for a length unit
+    "radius": (1e-5, 1e6),
 }
+_OPTIONAL = ("arrival_tolerance", "correction_tolerance", "radius")
 
 
 def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
@@ -134,7 +143,7 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
     model : MotionModel
     radius : float, optional
         Radius of the goals (in length units). If it is passed, ``correction_tolerance`` must be
-        smaller than the radius.
+        smaller than the radius: that of the model, if it has one.
 
     Returns
     -------
@@ -156,13 +165,14 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
     constants: dict[str, Any] = {"norm": str(model.norm)}
     for name, (least, largest) in _BOUNDS.items():
         value = getattr(model, name)
-        if value is not None or not name.endswith("_tolerance"):
+        if value is not None or name not in _OPTIONAL:
             check_limits(f"model.{name}", value, least, largest)
             constants[name] = type(least)(value)
     if model.norm not in get_args(Norm):
         raise ValueError(
             f"model.norm is {brief_value(model.norm)}; it must be 'euclidean' or 'maximum'"
         )
+    radius = radius if model.radius is None else float(model.radius)
     if radius is not None and (model.correction_tolerance or 0.0) >= radius:
         raise ValueError(
             f"model.correction_tolerance is {model.correction_tolerance}; it must be below the "

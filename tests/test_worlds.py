@@ -116,7 +116,7 @@ def test_ids_are_those_of_the_paper_unless_the_world_is_another():
     assert len({cell.id for cell in cells}) == 4
     for cell in cells:
         stored = json.loads(json.dumps(cell.content))["model"]
-        assert {"motor_noise", "norm", "base_weight"} & {*stored} == {
+        assert {"motor_noise", "norm", "base_weight", "radius"} & {*stored} == {
             name.partition("=")[0] for name in cell.world.split(", ") if name
         }
 
@@ -124,7 +124,10 @@ def test_ids_are_those_of_the_paper_unless_the_world_is_another():
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ("{ sd = 0.1 }", "model has no constant 'sd'; it has motor_noise, norm, base_weight"),
+        (
+            "{ sd = 0.1 }",
+            "model has no constant 'sd'; it has motor_noise, norm, base_weight, radius",
+        ),
         ("{ motor_noise = -0.1 }", "model.motor_noise is -0.1"),
         ('{ norm = "taxi" }', "model.norm is 'taxi'; it must be 'euclidean' or 'maximum'"),
         ("{ base_weight = 0.0 }", "model.base_weight is 0.0"),

@@ -550,7 +550,7 @@ def _film(
         title = f"{subject}\n{title_of(stored.cell.method)}, run {stored['run']}"
         movements.append((title, movement))
     if initial:
-        task, model = stored.cell.task, stored.cell.model.without_noise()
+        task, model = stored.cell.arena, stored.cell.model.without_noise()
         trial = corrective_trial(task, initial_hands(task, model=model), model=model)
         alone = trajectory(task, trial.movements, model)
         movements.insert(0, (f"{subject}\ncorrective process alone", alone))

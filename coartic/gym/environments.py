@@ -28,7 +28,7 @@ from coartic.motion.trials import (
 from coartic.robot import HANDS, MAX_NUMBER, Array
 from coartic.tasks.catalogue import as_task
 from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
-from coartic.tasks.task import MAX_GOALS, Split, Task
+from coartic.tasks.task import MAX_GOALS, Split, Task, in_world
 
 REACH = 0.5
 """Displacement of the target of a joint by an action entry of 1, in length units (base) and rad
@@ -289,7 +289,7 @@ class TaskEnv(gymnasium.Env):
 
     def _load(self, number: int) -> None:
         """Load the task with index ``number``, from 0, and prepare its trials."""
-        self.tasks[number] = task = as_task(self.tasks[number])
+        self.tasks[number] = task = in_world(as_task(self.tasks[number]), self.model)
         self._compiled = compiled_task(task, self.model, checks=False)
         self._exact = compiled_task(task, self.model.without_noise(), checks=False)
         self.task, self.number, self._goals = task, number, task.goal_array

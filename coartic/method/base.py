@@ -159,7 +159,8 @@ class Method(ABC):
     is not a part of the id of a run."""
     adapts_to: ClassVar[frozenset[str] | None] = None
     """Constants of the world (:data:`.WORLD`) that may differ from the paper's when the method
-    runs. ``motor_noise`` may always differ. None, the default, stands for
+    runs. ``motor_noise`` may always differ, and so may ``radius``, since a method gets the task
+    with this radius. None, the default, stands for
 
     - only ``motor_noise``, if the method declares the reward formula or the kinematic model,
       because such a method may itself compute lengths as in the paper;
@@ -198,15 +199,15 @@ class Method(ABC):
         """Return a sentence on why the method cannot run under a motion model, or None.
 
         The sentence names the first constant of the world that differs from the paper's and to
-        which the method does not adapt (:attr:`adapts_to`). Motor noise, and constants that are not
-        in :data:`.WORLD`, are never a reason.
+        which the method does not adapt (:attr:`adapts_to`). Motor noise, the radius of the goals,
+        and constants that are not in :data:`.WORLD`, are never a reason.
         """
         adapts_to = cls.adapts_to
         if adapts_to is None:
             knows = {Information.REWARD_FORMULA, Information.KINEMATIC_MODEL} & cls.information
             adapts_to = frozenset({"motor_noise"} if knows else WORLD)
         for name, value in differences(model).items():
-            if name not in {"motor_noise", *adapts_to}:
+            if name not in {"motor_noise", "radius", *adapts_to}:
                 paper = getattr(PAPER, name)
                 return (
                     f"model.{name} is {value!r}; method {cls.name!r} plans with the paper's "

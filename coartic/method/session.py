@@ -40,7 +40,7 @@ from coartic.motion.trials import (
     trials_of,
 )
 from coartic.robot import Array, Configs, Hand, Hands, Robot
-from coartic.tasks.task import Task
+from coartic.tasks.task import Task, in_world
 
 
 class Information(StrEnum):
@@ -216,7 +216,7 @@ class Session:
         trusted: bool = False,
         of_run: bool = False,
     ) -> None:
-        self._task = task
+        self._task = in_world(task, model)
         self._information = frozenset(information)
         self._used: set[Information] = set()
         self._process = os.getpid()

@@ -35,7 +35,7 @@ from coartic.motion.kernels.trial import (
 )
 from coartic.motion.kernels.trial import NO_REWARD as NO_REWARD
 from coartic.robot import HANDS, MAX_ENTRY, Array, Configs, Hands, Points, Robot
-from coartic.tasks.task import Task, check_hands, hands_of
+from coartic.tasks.task import Task, check_hands, hands_of, in_world
 
 
 class TrialRecords(NamedTuple):
@@ -300,6 +300,7 @@ def compiled_task(
         The model is not a MotionModel.
     """
     global _last_compiled
+    task = in_world(task, model) if isinstance(model, MotionModel) else task
     latest = _last_compiled  # another thread may replace it
     options = checks, grows
     if latest is not None and latest.task is task and latest.model is model:  # noqa: SIM102

@@ -20,7 +20,7 @@ from coartic.motion.execution import Execution, execute, sample_execution
 from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.catalogue import TaskLike, as_task
-from coartic.tasks.task import Task, hands_of
+from coartic.tasks.task import Task, hands_of, in_world
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -214,8 +214,8 @@ def trajectory(
         A constant of the model is out of bounds or does not fit the radius of the goals, or the
         model has motor noise.
     """
-    task = as_task(task)
     execution = execute(task, movements, model=model)
+    task = in_world(as_task(task), model)
     if not execution.completed:
         raise SolutionError(f"task {task.name!r}: {execution.reason}")
     rows = sample_execution(task, execution.movements, model)

@@ -19,7 +19,7 @@ from coartic.internal.text import describe_parameters
 from coartic.model import PAPER, MotionModel, check_model, differences
 from coartic.runs.contrasts import Contrast
 from coartic.runs.method_info import MethodInfo, same_value
-from coartic.tasks.task import Task
+from coartic.tasks.task import Task, in_world
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,16 @@ class Cell:
     (:mod:`coartic.method.as_method`)."""
 
     def __post_init__(self) -> None:
-        model = check_model(self.model).for_radius(self.task.radius)
+        model = check_model(self.model)
+        if model.radius == self.task.radius:  # this is no other world
+            model = model._replace(radius=None)
+        model = model.for_radius(self.task.radius)
         object.__setattr__(self, "model", model)
+
+    @cached_property
+    def arena(self) -> Task:
+        """The task with the radius of the goals in the world of the cell (:func:`.in_world`)."""
+        return in_world(self.task, self.model)
 
     @cached_property
     def world(self) -> str:

@@ -190,7 +190,7 @@ def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date
         part: [*map(movement_data, execution.movements)] for part, execution in executions.items()
     }
     if solution := executions.get("solution"):
-        task, hands = job.cell.task, hands_of(solution.hands)
+        task, hands = job.cell.arena, hands_of(solution.hands)
         parts["solution"] = SimpleNamespace(
             reward=None if is_noisy else solution.reward,
             hands=solution.hands,
@@ -479,7 +479,7 @@ def judge(
 def judged(runs: Sequence[Row]) -> list[Row]:
     """Return copies of solved runs of one cell in a world with noise, with :data:`OF_NOISE` set."""
     cell, seeds = runs[0].cell, [run.job.judge_seed(run["run"]) for run in runs]
-    means, failed = judge(cell.task, [run.part("solution") for run in runs], cell.model, seeds)
+    means, failed = judge(cell.arena, [run.part("solution") for run in runs], cell.model, seeds)
     return [
         run.with_values(
             mean_ticks=None if math.isnan(mean) else mean,

@@ -26,7 +26,7 @@ from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import Line, did_you_mean, plain, pluralize
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, described_error, explain
-from coartic.model import PAPER, PAPER_RADIUS
+from coartic.model import PAPER, PAPER_RADIUS, MotionModel
 from coartic.robot import HANDS, MAX_LINKS, Array, Finite, Hand, Length, Robot
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
@@ -350,6 +350,20 @@ class Task(FileData):
             f'role="img" aria-label="{caption}">{"".join(marks)}</svg>'
             f"<figcaption>{caption}</figcaption></figure>"
         )
+
+
+def in_world(task: Task, model: MotionModel) -> Task:
+    """Return the task with the goals' radius of a motion model; the task itself if that is equal.
+
+    Examples
+    --------
+    >>> from coartic import load_task
+    >>> in_world(load_task("ascending"), MotionModel(radius=0.05)).radius
+    0.05
+    """
+    if model.radius is None or model.radius == task.radius:
+        return task
+    return task.model_copy(update={"radius": float(model.radius)})
 
 
 def check_hands(task: Task, hands: str) -> str:

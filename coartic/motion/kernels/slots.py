@@ -33,6 +33,9 @@ processor's first-level cache."""
 _VECTOR = 8  # number of slots in a vector; SLOTS is a multiple of it
 NORMS = get_args(Norm)
 """Norms of joint space. Kernels represent a norm by its index in this tuple."""
+_CONSTANTS = tuple(name for name in MotionModel._fields if name != "radius")
+"""Constants of the motion model in the record of :func:`robot_parameters`, which has the radius of
+the goals beside it."""
 GOING = 0.0
 """Status of a slot whose movement or correction goes on."""
 RobotRecord = Any
@@ -70,7 +73,7 @@ def _parameters_type(links: int) -> np.dtype[np.void]:
     """Return the NumPy type of the record of :func:`robot_parameters` for ``links`` per arm."""
     arm = {"first_joint": np.int64, "count": np.int64, "links": (np.float64, links)}
     shoulder = dict.fromkeys(("shoulder_x", "shoulder_y"), np.float64)
-    model: dict[str, Any] = dict.fromkeys(MotionModel._fields, np.float64)
+    model: dict[str, Any] = dict.fromkeys(_CONSTANTS, np.float64)
     model |= {"max_iterations": np.int64, "norm": np.int64}  # index in NORMS
     fields = {
         "arms": (record_type(arm | shoulder), len(HANDS)),
@@ -132,7 +135,8 @@ def robot_parameters(
         arm["links"][: len(links)] = links
         arm["shoulder_x"], arm["shoulder_y"] = shoulder
     constants = model.for_radius(radius)
-    parameters["model"] = tuple(constants._replace(norm=NORMS.index(model.norm)))  # type: ignore[arg-type]
+    numbers = constants._asdict() | {"norm": NORMS.index(model.norm)}
+    parameters["model"] = tuple(numbers[name] for name in _CONSTANTS)
     parameters["radius"], parameters["checks"], parameters["grows"] = radius, checks, grows
     for axis in "xy":
         parameters[f"free_{axis}"] = axis not in locked_base
