@@ -114,8 +114,7 @@ def stored_task(content: str) -> Any:
     cell = json.loads(content, object_hook=lambda values: SimpleNamespace(**values))
     task = cell.task
     task.model = SimpleNamespace(**WORLD | vars(cell.model))
-    if task.model.radius is not None:
-        task.radius = task.model.radius
+    task.radius = task.model.radius or task.radius
     method, given = plain["method"], plain["parameters"]
     changed = [f"{n}={x}" for n, x in given.items() if repr(x) != repr(method["defaults"].get(n))]
     world = [f"{name}={x}" for name, x in vars(task.model).items() if x != WORLD.get(name, x)]

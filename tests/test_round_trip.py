@@ -58,7 +58,7 @@ def test_constants_have_one_type():
     written |= {"max_iterations": np.int64(9), "norm": np.str_("maximum")}
     model = model_from(written)
     assert model == PAPER._replace(**written)
-    kinds = {float: 5, int: 1, str: 1, type(None): 1}  # one tolerance follows from the radius
+    kinds = {float: 5, int: 1, str: 1, type(None): 2}  # the task's radius, and a tolerance
     assert {kind: [*map(type, model)].count(kind) for kind in kinds} == kinds
     assert check_model(model) is model
 
